@@ -1,0 +1,1 @@
+"""What the pointer does: tools turn pointer events into commands."""
