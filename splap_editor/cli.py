@@ -1,0 +1,222 @@
+"""The command line: deform, inspect and dump graphs without a window, or open the window."""
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import splap_editor
+from splap_editor.stage_report import StageReport
+
+EXIT_OK, EXIT_REFUSED = 0, 2
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run ``splap-editor``.
+
+    Returns
+    -------
+    int
+        0, or 2 after one sentence on standard error that says what is wrong and what to do.
+    """
+    arguments = list(sys.argv[1:] if arguments is None else arguments)
+    options = _parser().parse_args(_with_command(arguments))
+    try:
+        return options.run(options)
+    except (ValueError, OSError, MemoryError) as error:
+        print(f"splap-editor: {_sentence(error)}", file=sys.stderr)
+        return EXIT_REFUSED
+    except KeyboardInterrupt:
+        print("splap-editor: stopped; nothing was written", file=sys.stderr)
+        return EXIT_REFUSED
+
+
+def _with_command(arguments: list[str]) -> list[str]:
+    """``splap-editor [FILE]`` opens the window, so that a file can be dropped on the program."""
+    if arguments and (arguments[0] in _COMMANDS or arguments[0] in ("-h", "--help", "--version")):
+        return arguments
+    return ["edit", *arguments]
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="splap-editor",
+        description="Bend, pose and reshape captured Gaussian splats. Without a command, open the editor.",
+    )
+    parser.add_argument("--version", action="version", version=f"splap-editor {splap_editor.__version__}")
+    commands = parser.add_subparsers(metavar="COMMAND", required=True)
+
+    edit = commands.add_parser("edit", help="open the editor (also: splap-editor [FILE])")
+    edit.add_argument("file", nargs="?", type=Path, help="a splat PLY; the bundled sample by default")
+    edit.set_defaults(run=_edit)
+
+    deform = commands.add_parser("deform", help="deform a splat PLY by a recipe")
+    _add_input(deform)
+    deform.add_argument("--recipe", required=True, type=Path, metavar="EDIT.json", help="what to deform, and how")
+    deform.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.ply")
+    deform.add_argument("--as-3dgs", action="store_true", help="add a thin third scale to a file of two")
+    deform.add_argument("--no-cache", action="store_true", help="neither read nor keep graph and Laplacian")
+    _add_output(deform)
+    deform.set_defaults(run=_deform)
+
+    info = commands.add_parser("info", help="say what wrote a file, what is in it and what is odd about it")
+    _add_input(info)
+    info.add_argument("--graph", action="store_true", help="also build the splat graph and its Laplacian")
+    _add_output(info)
+    info.set_defaults(run=_info)
+
+    graph = commands.add_parser("graph", help="write the splat graph as a PLY with vertices and edges")
+    _add_input(graph)
+    graph.add_argument("-o", "--output", required=True, type=Path, metavar="EDGES.ply")
+    graph.add_argument("--rule", choices=("touch", "paper"), default="touch", help="how edges are chosen")
+    graph.add_argument("--epsilon", type=float, default=0.005, help="gap that still counts as touching, of the size")
+    _add_output(graph)
+    graph.set_defaults(run=_graph)
+    return parser
+
+
+def _add_input(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", type=Path, metavar="IN.ply")
+    parser.add_argument("--layout", help="read the file as this layout instead of the recognised one")
+
+
+def _add_output(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--quiet", action="store_true", help="no progress lines")
+    parser.add_argument("--json", action="store_true", help="one JSON object on standard output")
+
+
+def _edit(options: argparse.Namespace) -> int:
+    from splap_editor.app import run
+
+    return run(options.file)
+
+
+def _deform(options: argparse.Namespace) -> int:
+    from splap_editor.core.kernel_adaptation import adapted_splats
+    from splap_editor.io.ply import read_ply, write_ply
+    from splap_editor.io.recipe import read_recipe
+    from splap_editor.session.cache import StageCache
+    from splap_editor.session.export_report import export_report
+    from splap_editor.session.pipeline import deformer_of, handles_of, kernels_of, surface_of
+    from splap_editor.session.recipe_edit import edit_of
+
+    report = StageReport(quiet=options.quiet or options.json)
+    recipe = read_recipe(options.recipe)
+    with report("read"):
+        file = read_ply(options.file, layout=options.layout, progress=report.progress)
+    for warning in file.warnings:
+        report.say(f"note: {warning}")
+    edit = edit_of(recipe, file.splats)
+    kernels = None
+    deformation = None
+    if edit.active_handles:
+        cache = None if options.no_cache else StageCache()
+        surface = surface_of(file.splats, edit.graph, cache=cache, stages=report.stage)
+        report.end_stage()
+        with report("bind"):
+            handles = handles_of(surface, edit)
+            deformer = deformer_of(surface, edit, handles, progress=report.progress)
+        with report("solve"):
+            deformation = deformer.solve(edit.transforms, progress=report.progress)
+        with report("adapt"):
+            kernels = kernels_of(surface, edit, deformation)
+    with report("colour"):
+        splats = file.splats if kernels is None else adapted_splats(file.splats, kernels)
+    with report("write"):
+        write_ply(options.output, file, splats, as_3dgs=options.as_3dgs)
+    summary = export_report(options.output, file.splats, kernels)
+    if options.json:
+        print(
+            json.dumps(
+                {
+                    "output": str(options.output),
+                    "n_splats": summary.n_splats,
+                    "n_changed": summary.n_changed,
+                    "largest_displacement": summary.largest_displacement,
+                    "largest_stretch": summary.largest_stretch,
+                    "residual": deformation.residual if deformation is not None else 0.0,
+                    "n_iterations": deformation.n_iterations if deformation is not None else 0,
+                    "warnings": file.warnings,
+                    "timings_s": report.timings_s,
+                }
+            )
+        )
+    else:
+        report.say(str(summary))
+    return EXIT_OK
+
+
+def _info(options: argparse.Namespace) -> int:
+    from splap_editor.io.ply import read_ply
+    from splap_editor.session.scene_info import graph_info, scene_info
+
+    report = StageReport(quiet=options.quiet or options.json)
+    with report("read"):
+        file = read_ply(options.file, layout=options.layout, progress=report.progress)
+    with report("occupancy"):
+        info, ellipses = scene_info(file)
+    if options.graph:
+        from splap_editor.core.splat_graph import GraphOptions
+        from splap_editor.session.pipeline import surface_of
+
+        surface = surface_of(file.splats, GraphOptions(), ellipses=ellipses, stages=report.stage)
+        report.end_stage()
+        info["graph"] = graph_info(surface.graph)
+    if options.graph:
+        info["timings_s"] = {name: round(seconds, 4) for name, seconds in report.timings_s.items()}
+    print(json.dumps(info) if options.json else _readable(info))
+    return EXIT_OK
+
+
+def _graph(options: argparse.Namespace) -> int:
+    from splap_editor.core.ellipse_offset import normal_offsets
+    from splap_editor.core.occupancy import occupancy_ellipses
+    from splap_editor.core.splat_graph import GraphOptions, splat_graph
+    from splap_editor.io.edges_ply import write_edges_ply
+    from splap_editor.io.ply import read_ply
+    from splap_editor.session.scene_info import graph_info
+
+    report = StageReport(quiet=options.quiet or options.json)
+    with report("read"):
+        file = read_ply(options.file, layout=options.layout, progress=report.progress)
+    with report("occupancy"):
+        ellipses = occupancy_ellipses(file.splats)
+    with report("graph"):
+        graph = splat_graph(
+            ellipses, GraphOptions(rule=options.rule, epsilon=options.epsilon), progress=report.progress
+        )
+    with report("offsets"):
+        offsets = normal_offsets(ellipses, graph.edges).min(axis=1)
+    with report("write"):
+        rows = ellipses.rows[graph.edges]
+        lengths = graph.edge_lengths
+        write_edges_ply(options.output, file.splats.means, rows, offsets, lengths)
+    info = graph_info(graph)
+    print(json.dumps(info)) if options.json else report.say(_readable(info))
+    return EXIT_OK
+
+
+_COMMANDS = ("edit", "deform", "info", "graph")
+
+
+def _readable(info: dict, indent: str = "") -> str:
+    lines = []
+    for key, value in info.items():
+        name = key.replace("_", " ")
+        if isinstance(value, dict):
+            lines += [f"{indent}{name}:", _readable(value, indent + "  ")]
+        elif isinstance(value, list):
+            lines.append(f"{indent}{name}: " + ("none" if not value else ""))
+            lines += [f"{indent}  - {item}" for item in value]
+        else:
+            lines.append(f"{indent}{name}: {value:,}" if isinstance(value, int) else f"{indent}{name}: {value}")
+    return "\n".join(lines)
+
+
+def _sentence(error: BaseException) -> str:
+    if isinstance(error, MemoryError):
+        return "there is not enough memory for this scene; close other programs or use a smaller file"
+    if isinstance(error, OSError) and error.filename:
+        return f"{error.filename}: {error.strerror}"
+    return str(error)

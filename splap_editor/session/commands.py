@@ -1,0 +1,76 @@
+"""The undoable steps: each a swap between a value before and a value after."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from splap_editor.session.edit import Edit
+from splap_editor.session.scene import Scene
+
+EDIT_BYTES = 2048
+"""What an edit costs beside the rows of its regions, about."""
+
+
+@dataclass(eq=False)
+class ChangeEdit:
+    """Handles, poses, pins, graph mends or options changed."""
+
+    scene: Scene
+    before: Edit
+    after: Edit
+    label: str
+
+    @property
+    def nbytes(self) -> int:
+        """Rows that only the state before or after holds, and a little."""
+        shared = {id(region) for region in _regions(self.before)} & {id(region) for region in _regions(self.after)}
+        rows = sum(
+            np.asarray(region.rows).nbytes
+            for edit in (self.before, self.after)
+            for region in _regions(edit)
+            if region.rows is not None and id(region) not in shared
+        )
+        return EDIT_BYTES + rows
+
+    def do(self) -> None:
+        """Put the changed edit in place."""
+        self.scene.set_edit(self.after)
+
+    def undo(self) -> None:
+        """Put the edit from before back."""
+        self.scene.set_edit(self.before)
+
+
+class ChangeMask:
+    """The selection or the hidden splats changed; the masks are kept eight splats to a byte."""
+
+    def __init__(self, scene: Scene, name: str, after: NDArray[np.bool_], label: str) -> None:
+        self.label = label
+        self._scene = scene
+        self._name = name
+        self._before = np.packbits(getattr(scene, name))
+        self._after = np.packbits(after)
+
+    @property
+    def nbytes(self) -> int:
+        """Both packed masks."""
+        return self._before.nbytes + self._after.nbytes
+
+    def do(self) -> None:
+        """Put the changed mask in place."""
+        self._set(self._after)
+
+    def undo(self) -> None:
+        """Put the mask from before back."""
+        self._set(self._before)
+
+    def _set(self, packed: NDArray[np.uint8]) -> None:
+        mask = np.unpackbits(packed, count=self._scene.splats.n_splats).astype(bool)
+        getattr(self._scene, f"set_{self._name}")(mask)
+
+
+def _regions(edit: Edit):
+    yield from edit.pins
+    for handle in edit.handles:
+        yield handle.region

@@ -1,0 +1,100 @@
+"""The open file and what the artist made of it. Only the main thread touches it."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from splap_editor.core.deformer import Deformation
+from splap_editor.core.kernel_adaptation import AdaptedKernels
+from splap_editor.core.occupancy import Ellipses
+from splap_editor.core.splats import Splats
+from splap_editor.io.ply import SplatFile
+from splap_editor.session.edit import Edit
+from splap_editor.session.pipeline import Surface
+from splap_editor.session.signals import Signal
+
+
+class Scene:
+    """A model: values, and a signal for each that changes. It draws nothing and starts no work.
+
+    The rest pose is never overwritten: what is shown is the file's splats, or
+    ``kernels`` where the edit moves something.
+    """
+
+    def __init__(self, file: SplatFile, ellipses: Ellipses) -> None:
+        self.file = file
+        self.ellipses = ellipses
+        self.surface: Surface | None = None
+        self.edit = Edit()
+        self.preview: Edit | None = None
+        self.kernels: AdaptedKernels | None = None
+        self.deformation: Deformation | None = None
+        self.presented: object = None
+        self.selection = np.zeros(file.splats.n_splats, bool)
+        self.hidden = np.zeros(file.splats.n_splats, bool)
+        self.active_handles: tuple[int, ...] = ()
+        self.surface_changed = Signal()
+        self.edit_changed = Signal()
+        self.preview_changed = Signal()
+        self.pose_changed = Signal()
+        self.selection_changed = Signal()
+        self.hidden_changed = Signal()
+        self.active_handles_changed = Signal()
+
+    @property
+    def splats(self) -> Splats:
+        """The splats at rest, as the file holds them."""
+        return self.file.splats
+
+    @property
+    def shown_edit(self) -> Edit:
+        """The edit on screen: a drag's preview while there is one."""
+        return self.preview if self.preview is not None else self.edit
+
+    @property
+    def positions(self) -> NDArray[np.floating]:
+        """(N, 3) centres on screen, in world units and file order."""
+        return self.splats.means if self.kernels is None else self.kernels.means
+
+    def set_surface(self, surface: Surface | None) -> None:
+        """Take the graph, Laplacian and kernel carriers, or none while they are made anew."""
+        self.surface = surface
+        self.surface_changed.emit()
+
+    def set_edit(self, edit: Edit) -> None:
+        """Replace the edit; the preview of a drag is dropped, and so are active handles that are gone."""
+        self.edit = edit
+        self.preview = None
+        known = {handle.handle_id for handle in edit.handles}
+        kept = tuple(handle_id for handle_id in self.active_handles if handle_id in known)
+        self.edit_changed.emit()
+        self.set_active_handles(kept)
+
+    def set_preview(self, edit: Edit | None) -> None:
+        """Show an edit that is not in the history yet, or go back to the one that is."""
+        self.preview = edit
+        self.preview_changed.emit()
+
+    def set_pose(
+        self, kernels: AdaptedKernels | None, deformation: Deformation | None = None, presented: object = None
+    ) -> None:
+        """Show adapted kernels, or the rest pose; ``presented`` is what the view prepared for them on the worker."""
+        self.kernels = kernels
+        self.deformation = deformation
+        self.presented = presented
+        self.pose_changed.emit()
+
+    def set_selection(self, selection: NDArray[np.bool_]) -> None:
+        """Replace the (N,) selection mask."""
+        self.selection = selection
+        self.selection_changed.emit()
+
+    def set_hidden(self, hidden: NDArray[np.bool_]) -> None:
+        """Replace the (N,) mask of splats that are neither drawn nor picked."""
+        self.hidden = hidden
+        self.hidden_changed.emit()
+
+    def set_active_handles(self, handle_ids: tuple[int, ...]) -> None:
+        """Choose the handles that gizmo and keys act on."""
+        if handle_ids != self.active_handles:
+            self.active_handles = handle_ids
+            self.active_handles_changed.emit()

@@ -1,0 +1,59 @@
+"""Selections as masks over all splats: modifiers, and growing along the surface."""
+
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from splap_editor.core.occupancy import Ellipses
+from splap_editor.core.splat_graph import SplatGraph
+
+Mask = NDArray[np.bool_]
+
+
+class SelectionMode(Enum):
+    """How newly picked splats meet those already selected."""
+
+    REPLACE = "replace"
+    ADD = "add"
+    REMOVE = "remove"
+    INTERSECT = "intersect"
+
+
+def combined_selection(selection: Mask, picked: Mask, mode: SelectionMode) -> Mask:
+    """Apply a picked mask to a selection; every selection tool ends here."""
+    if mode is SelectionMode.ADD:
+        return selection | picked
+    if mode is SelectionMode.REMOVE:
+        return selection & ~picked
+    if mode is SelectionMode.INTERSECT:
+        return selection & picked
+    return picked.copy()
+
+
+def grown_selection(selection: Mask, ellipses: Ellipses, graph: SplatGraph) -> Mask:
+    """Add the graph neighbours of the selected splats."""
+    nodes = selection[ellipses.rows]
+    touched = (graph.matrix() @ nodes.astype(np.float64)) > 0
+    return _with_nodes(selection, ellipses, nodes | touched)
+
+
+def shrunk_selection(selection: Mask, ellipses: Ellipses, graph: SplatGraph) -> Mask:
+    """Drop the selected splats that have a neighbour outside the selection."""
+    nodes = selection[ellipses.rows]
+    outside = (graph.matrix() @ (~nodes).astype(np.float64)) > 0
+    return _with_nodes(selection, ellipses, nodes & ~outside)
+
+
+def connected_selection(selection: Mask, ellipses: Ellipses, graph: SplatGraph) -> Mask:
+    """Select every splat in a component of the graph that holds a selected one."""
+    nodes = selection[ellipses.rows]
+    reached = np.zeros(graph.components.max(initial=-1) + 1, bool)
+    reached[graph.components[nodes]] = True
+    return _with_nodes(selection, ellipses, reached[graph.components])
+
+
+def _with_nodes(selection: Mask, ellipses: Ellipses, nodes: Mask) -> Mask:
+    mask = selection.copy()
+    mask[ellipses.rows] = nodes
+    return mask

@@ -1,0 +1,376 @@
+"""One open scene, its history and its background work: what the window and its tools talk to."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from splap_editor.core.deformer import Deformation, Deformer, Handles
+from splap_editor.core.handle_nodes import Region
+from splap_editor.core.kernel_adaptation import AdaptedKernels, adapted_splats
+from splap_editor.core.occupancy import occupancy_ellipses
+from splap_editor.core.splat_graph import GraphOptions
+from splap_editor.io.ply import read_ply, write_ply
+from splap_editor.io.recipe import read_recipe, write_recipe
+from splap_editor.session.cache import StageCache
+from splap_editor.session.commands import ChangeEdit, ChangeMask
+from splap_editor.session.edit import HANDLE_COLORS, Edit, Handle, Pose, binds_like, poses_like
+from splap_editor.session.export_report import ExportReport, export_report
+from splap_editor.session.history import History
+from splap_editor.session.jobs import Job, Post, Worker
+from splap_editor.session.pipeline import Surface, deformer_of, handles_of, kernels_of, surface_of
+from splap_editor.session.recipe_edit import edit_of, recipe_of
+from splap_editor.session.scene import Scene
+from splap_editor.session.signals import Signal
+
+Presenter = Callable[[AdaptedKernels | None], object]
+"""Prepares on the worker what the view needs of new kernels, such as a drawing order."""
+
+
+@dataclass(frozen=True, eq=False)
+class BoundEdit:
+    """A deformer, and the edit it was bound for."""
+
+    edit: Edit
+    handles: Handles
+    deformer: Deformer
+
+
+class Session:
+    """Reconciles what the artist asked for with what has been made so far.
+
+    Every change of scene or edit ends in `_advance`, which looks at the edit
+    on screen and starts the one job that is missing next: prepare the
+    surface, bind the deformer, pose the splats. A job that is no longer
+    wanted is cancelled. Nothing here waits for the worker.
+
+    Parameters
+    ----------
+    post : callable
+        Runs a callable on the main thread, soon; used by the worker.
+    cache : StageCache, optional
+        Where stages are kept between runs; none are kept without.
+    """
+
+    def __init__(self, post: Post, *, cache: StageCache | None = None) -> None:
+        self.scene: Scene | None = None
+        self.history = History()
+        self.worker = Worker(post)
+        self.worker.on_progress = lambda job: self.job_changed.emit(job)
+        self.worker.on_busy = lambda job: self.job_changed.emit(job)
+        self.cache = cache
+        self.presenter: Presenter | None = None
+        self.scene_changed = Signal()
+        self.job_changed = Signal()
+        self.state_changed = Signal()
+        self.failed = Signal()
+        self.exported = Signal()
+        self.state = "empty"
+        self.is_halted = False
+        self._bound: BoundEdit | None = None
+        self._posed: Edit | None = None
+        self._settled: Edit | None = None
+        self._given_up: Edit | None = None
+        self._pending_export: tuple[Path, dict] | None = None
+        self._exported_edit: Edit | None = None
+        self._jobs: dict[str, tuple[Job, object]] = {}
+
+    # ------------------------------------------------------------------ files
+
+    def open(self, path: Path, *, layout: str | None = None) -> None:
+        """Read a splat PLY in the background; the scene on screen stays until it is read."""
+
+        def read(job: Job) -> Scene:
+            file = read_ply(path, layout=layout, progress=job.progress("reading"))
+            job.report(1.0, "occupancy")
+            return Scene(file, occupancy_ellipses(file.splats))
+
+        cancels = ("open", "prepare", "bind", "pose")
+        self._submit("open", f"Opening {path.name}", read, self._show, cancels=cancels)
+
+    def export(self, path: Path, *, as_3dgs: bool = False) -> None:
+        """Write the splats on screen, once they have settled, as a PLY."""
+        self._pending_export = (path, {"as_3dgs": as_3dgs})
+        self._advance()
+
+    def save_edit(self, path: Path) -> None:
+        """Write the edit as a recipe for ``splap-editor deform``."""
+        write_recipe(path, recipe_of(self._scene().edit))
+
+    def open_edit(self, path: Path) -> None:
+        """Replace the edit by a recipe's, as one undoable step."""
+        scene = self._scene()
+        self.change_edit(edit_of(read_recipe(path), scene.splats), "Open edit")
+
+    @property
+    def has_unexported_edit(self) -> bool:
+        """Whether the edit differs from the one last exported (or from the file's own pose)."""
+        scene = self.scene
+        if scene is None:
+            return False
+        exported = self._exported_edit or Edit()
+        return not (binds_like(scene.edit, exported) and poses_like(scene.edit, exported)) and not (
+            scene.edit.is_identity and exported.is_identity
+        )
+
+    # ------------------------------------------------------------------ edits
+
+    def change_edit(self, edit: Edit, label: str) -> None:
+        """Replace the edit as one undoable step."""
+        scene = self._scene()
+        self.history.push(ChangeEdit(scene, scene.edit, edit, label))
+
+    def change_mask(self, name: str, mask: NDArray[np.bool_], label: str) -> None:
+        """Replace ``"selection"`` or ``"hidden"`` as one undoable step; no step when nothing changes."""
+        scene = self._scene()
+        if not np.array_equal(getattr(scene, name), mask):
+            self.history.push(ChangeMask(scene, name, mask, label))
+
+    def add_handle(self, region: Region, *, name: str | None = None) -> Handle:
+        """Place a handle, make it the active one, and prepare to move it."""
+        scene = self._scene()
+        handle_id = scene.edit.next_handle_id()
+        handle = Handle(
+            handle_id,
+            name or f"Handle {handle_id}",
+            HANDLE_COLORS[(handle_id - 1) % len(HANDLE_COLORS)],
+            region,
+        )
+        self.is_halted = False
+        self.change_edit(scene.edit.with_handle(handle), "Place handle")
+        scene.set_active_handles((handle_id,))
+        return handle
+
+    def add_pin(self, region: Region) -> None:
+        """Hold splats where they are."""
+        edit = self._scene().edit
+        self.change_edit(replace(edit, pins=(*edit.pins, region)), "Place pin")
+
+    def preview_poses(self, poses: Mapping[int, Pose]) -> None:
+        """Show handles at poses that are not in the history yet; the newest request wins."""
+        scene = self._scene()
+        scene.set_preview(scene.edit.with_poses(dict(poses)))
+
+    def commit_preview(self, label: str) -> None:
+        """Make the previewed poses one undoable step, and settle."""
+        scene = self._scene()
+        if scene.preview is not None:
+            self.change_edit(scene.preview, label)
+
+    def cancel_preview(self) -> None:
+        """Go back to the poses from before the drag."""
+        scene = self._scene()
+        if scene.preview is not None:
+            scene.set_preview(None)
+
+    # ------------------------------------------------------------------ background work
+
+    def halt(self) -> None:
+        """Cancel the background work and leave it until `resume`, as a person's Cancel does."""
+        self.is_halted = True
+        self._pending_export = None
+        self.worker.cancel()
+        self._set_state("halted")
+
+    def resume(self) -> None:
+        """Go on with the work that `halt` left, or that failed."""
+        self.is_halted = False
+        self._given_up = None
+        self._advance()
+
+    def refresh_pose(self) -> None:
+        """Pose anew, although no handle moved: the view wants its presentation made again."""
+        self._posed = self._settled = None
+        self._advance()
+
+    def close(self) -> None:
+        """Cancel everything and join the worker."""
+        self.worker.close()
+
+    @property
+    def bound(self) -> BoundEdit | None:
+        """The deformer in use, for read-outs such as weights and residuals."""
+        return self._bound
+
+    def _advance(self) -> None:
+        scene = self.scene
+        if scene is None or self.is_halted or self.worker.is_busy("open"):
+            return
+        edit = scene.shown_edit
+        if edit is self._given_up:
+            return
+        if scene.surface is None or scene.surface.options != edit.graph:
+            self._prepare(scene, edit.graph)
+        elif not edit.active_handles:
+            self._rest(scene, edit)
+        elif self._bound is None or not binds_like(self._bound.edit, edit):
+            self._bind(scene, edit)
+        elif not self._is_posed(edit, settled=scene.preview is None):
+            self._pose(scene, edit)
+        else:
+            self._set_state("settled" if scene.preview is None else "dragging")
+            self._export_pending(scene)
+
+    def _is_posed(self, edit: Edit, *, settled: bool) -> bool:
+        made = self._settled if settled else self._posed
+        return made is not None and binds_like(made, edit) and poses_like(made, edit)
+
+    def _prepare(self, scene: Scene, options: GraphOptions) -> None:
+        if self._is_making("prepare", lambda wanted: wanted == options):
+            return
+        splats, ellipses, cache = scene.splats, scene.ellipses, self.cache
+
+        def prepare(job: Job) -> Surface:
+            return surface_of(splats, options, ellipses=ellipses, cache=cache, stages=job.progress)
+
+        def done(surface: Surface) -> None:
+            if self.scene is scene:
+                self._bound = self._posed = self._settled = None
+                scene.set_surface(surface)
+                self._advance()
+
+        self._set_state("preparing")
+        title = f"Preparing {scene.file.path.name}"
+        self._submit("prepare", title, prepare, done, wanted=options, cancels=("prepare", "bind", "pose"))
+
+    def _bind(self, scene: Scene, edit: Edit) -> None:
+        if self._is_making("bind", lambda wanted: binds_like(wanted, edit)):
+            return
+        surface = scene.surface
+
+        def bind(job: Job) -> BoundEdit:
+            handles = handles_of(surface, edit)
+            return BoundEdit(edit, handles, deformer_of(surface, edit, handles, progress=job.progress("binding")))
+
+        def done(bound: BoundEdit) -> None:
+            if self.scene is scene and scene.surface is surface:
+                self._bound = bound
+                self._posed = self._settled = None
+                self._advance()
+
+        self._set_state("binding")
+        self._submit("bind", "Binding handles", bind, done, wanted=edit, cancels=("bind", "pose"))
+
+    def _pose(self, scene: Scene, edit: Edit) -> None:
+        dragging = scene.preview is not None
+        if self.worker.is_busy("drag"):
+            return
+        if not dragging and self._is_making(
+            "pose", lambda wanted: binds_like(wanted, edit) and poses_like(wanted, edit)
+        ):
+            return
+        self.worker.cancel("pose")
+        bound, surface, presenter, transforms = self._bound, scene.surface, self.presenter, edit.transforms
+
+        def kernels(deformation: Deformation) -> tuple[AdaptedKernels, Deformation, object]:
+            adapted = kernels_of(surface, edit, deformation)
+            return adapted, deformation, presenter(adapted) if presenter is not None else None
+
+        def show(result: tuple) -> None:
+            if self.scene is scene and scene.surface is surface:
+                scene.set_pose(*result)
+
+        def drag(job: Job) -> tuple:
+            return kernels(bound.deformer.drag(transforms))
+
+        def dragged(result: tuple) -> None:
+            self._posed = edit
+            show(result)
+            self._advance()
+
+        def settle(job: Job) -> tuple:
+            def shown(deformation: Deformation) -> None:
+                result = kernels(deformation)
+                job.deliver(lambda: show(result))
+
+            return kernels(bound.deformer.solve(transforms, progress=job.progress("settling"), shown=shown))
+
+        def settled(result: tuple) -> None:
+            self._posed = self._settled = edit
+            show(result)
+            self._advance()
+
+        if dragging:
+            self._set_state("dragging")
+            self._submit("drag", "", drag, dragged, wanted=edit)
+        else:
+            self._set_state("settling")
+            self._submit("pose", "Settling", settle, settled, wanted=edit)
+
+    def _rest(self, scene: Scene, edit: Edit) -> None:
+        self.worker.cancel("bind", "pose", "drag")
+        self._bound = None
+        if scene.kernels is not None or self._settled is not edit:
+            self._posed = self._settled = edit
+            scene.set_pose(None)
+        self._set_state("ready")
+        self._export_pending(scene)
+
+    def _export_pending(self, scene: Scene) -> None:
+        if self._pending_export is None or scene.preview is not None:
+            return
+        (path, options), self._pending_export = self._pending_export, None
+        file, kernels, edit = scene.file, scene.kernels, scene.edit
+
+        def export(job: Job) -> ExportReport:
+            job.report(0.1, "rotating colours")
+            splats = file.splats if kernels is None else adapted_splats(file.splats, kernels)
+            job.report(0.5, "writing")
+            write_ply(path, file, splats, **options)
+            return export_report(path, file.splats, kernels)
+
+        def done(report: ExportReport) -> None:
+            if self.scene is scene:
+                self._exported_edit = edit
+            self.exported.emit(report)
+
+        self._submit("export", f"Exporting {path.name}", export, done)
+
+    def _show(self, scene: Scene) -> None:
+        self._bound = self._posed = self._settled = self._given_up = self._exported_edit = None
+        self.is_halted = False
+        self.scene = scene
+        self.history.clear()
+        scene.edit_changed.connect(self._advance)
+        scene.preview_changed.connect(self._advance)
+        self.scene_changed.emit()
+        self._advance()
+
+    def _is_making(self, kind: str, serves: Callable[[object], bool]) -> bool:
+        """Whether the job of this kind that waits or runs makes something that serves."""
+        job, wanted = self._jobs.get(kind, (None, None))
+        return job is not None and not job.is_cancelled and self.worker.is_busy(kind) and serves(wanted)
+
+    def _submit(
+        self,
+        kind: str,
+        title: str,
+        function: Callable[[Job], object],
+        done: Callable[[object], None],
+        *,
+        wanted: object = None,
+        cancels: tuple[str, ...] = (),
+    ) -> None:
+        def failed(error: Exception) -> None:
+            if kind in ("prepare", "bind", "pose", "drag") and self.scene is not None:
+                self._given_up = self.scene.shown_edit
+                self._set_state("failed")
+            self.failed.emit(title or "Moving the handle", error)
+            if kind == "open":
+                self._advance()
+
+        job = Job(kind, title, function, done=done, failed=failed, stopped=self._advance)
+        self._jobs[kind] = (job, wanted)
+        self.worker.submit(job, cancels=cancels)
+
+    def _set_state(self, state: str) -> None:
+        if state != self.state:
+            self.state = state
+            self.state_changed.emit()
+
+    def _scene(self) -> Scene:
+        if self.scene is None:
+            raise RuntimeError("no scene is open")
+        return self.scene

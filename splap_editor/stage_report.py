@@ -1,0 +1,65 @@
+"""Progress lines of the command line: one per stage, with its share and seconds."""
+
+import sys
+from time import perf_counter
+from types import TracebackType
+
+
+class StageReport:
+    """Prints ``stage  42 %`` on a terminal while a stage runs, and ``stage  1.3 s`` when it ends.
+
+    Lines go to standard error, so that standard output stays clean. Off a terminal only the ends are printed.
+    """
+
+    def __init__(self, *, quiet: bool = False) -> None:
+        self.timings_s: dict[str, float] = {}
+        self._quiet = quiet
+        self._live = not quiet and sys.stderr.isatty()
+        self._stage: str | None = None
+        self._start = self._drawn = 0.0
+
+    def __call__(self, stage: str) -> "StageReport":
+        self.stage(stage)
+        return self
+
+    def __enter__(self) -> "StageReport":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if kind is None:
+            self.end_stage()
+        elif self._live:
+            print(file=sys.stderr)
+
+    def stage(self, stage: str):
+        """Begin a stage, ending the one before; gives its progress callback."""
+        if stage != self._stage:
+            self.end_stage()
+            self._stage = stage
+            self._start = perf_counter()
+        return self.progress
+
+    def progress(self, share: float) -> None:
+        """Draw the share of the running stage, ten times a second at most."""
+        now = perf_counter()
+        if self._live and now - self._drawn > 0.1:
+            self._drawn = now
+            seconds = now - self._start
+            print(f"\r{self._stage:<12} {share:4.0%} {seconds:7.1f} s", end="", file=sys.stderr, flush=True)
+
+    def end_stage(self) -> None:
+        """Print the seconds of the running stage, if there is one."""
+        if self._stage is None:
+            return
+        seconds = perf_counter() - self._start
+        self.timings_s[self._stage] = self.timings_s.get(self._stage, 0.0) + seconds
+        if not self._quiet:
+            print(f"{chr(13) if self._live else ''}{self._stage:<12} 100% {seconds:7.1f} s", file=sys.stderr)
+        self._stage = None
+
+    def say(self, text: str) -> None:
+        """Print a line unless quiet."""
+        if not self._quiet:
+            print(text, file=sys.stderr)
