@@ -19,6 +19,7 @@ class StageReport:
         self._start = self._drawn = 0.0
 
     def __call__(self, stage: str) -> "StageReport":
+        """Begin a stage that ends with the ``with`` block."""
         self.stage(stage)
         return self
 

@@ -39,12 +39,12 @@ class StageCache:
         """Read the arrays kept under ``key``, or None."""
         path = self._path(key)
         try:
-            with np.load(path, allow_pickle=False) as bundle:
+            with open(path, "rb") as file, np.load(file, allow_pickle=False) as bundle:
                 arrays = {name: bundle[name] for name in bundle.files}  # reading each member checks its CRC
             os.utime(path)
-        except FileNotFoundError:
+        except (FileNotFoundError, NotADirectoryError):
             return None
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        except (OSError, ValueError, KeyError, EOFError, TypeError, AttributeError, zipfile.BadZipFile):
             path.unlink(missing_ok=True)
             return None
         return arrays
