@@ -213,7 +213,9 @@ def write_sample(path: Path | str, splats: Splats) -> None:
         "nx ny nz": np.zeros((splats.n_splats, 3)),
         "f_dc_0 f_dc_1 f_dc_2": splats.sh0,
         # Channel-major: all coefficients of red, then green, then blue.
-        " ".join(f"f_rest_{k}" for k in range(3 * n_rest)): splats.shN.transpose(0, 2, 1).reshape(-1, 3 * n_rest),
+        " ".join(f"f_rest_{k}" for k in range(3 * n_rest)): splats.shN.transpose(0, 2, 1).reshape(
+            splats.n_splats, 3 * n_rest
+        ),
         "opacity": splats.logit_opacities[:, None],
         " ".join(f"scale_{k}" for k in range(splats.n_scales)): splats.log_scales,
         "rot_0 rot_1 rot_2 rot_3": splats.quats,

@@ -1,0 +1,90 @@
+"""What every test stands on: fixed seeds, a cache of its own, and nothing left running behind."""
+
+import gc
+import os
+import random
+import sys
+import threading
+import weakref
+from collections.abc import Iterator
+from pathlib import Path
+
+# Small dense work is several times slower with BLAS threads; set before numpy is first imported.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("QT_API", "pyside6")
+
+import numpy as np
+import pytest
+
+_THREAD_GRACE_S = 5.0
+
+
+@pytest.fixture(autouse=True)
+def fixed_seeds() -> None:
+    """Give code that draws from the global generators the same numbers in every run."""
+    random.seed(0)
+    np.random.seed(0)  # noqa: NPY002 - the legacy generator is what a library would use
+
+
+@pytest.fixture(autouse=True)
+def own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Point the stage cache at an empty folder, so that no test sees another's or the user's."""
+    folder = tmp_path_factory.mktemp("cache")
+    monkeypatch.setenv("SPLAP_CACHE_DIR", str(folder))
+    return folder
+
+
+@pytest.fixture(autouse=True)
+def unchanged_numpy_errors() -> Iterator[None]:
+    """Fail a test that leaves numpy's error handling changed."""
+    before = np.geterr()
+    yield
+    after = np.geterr()
+    np.seterr(**before)
+    assert after == before, "the test, or what it called, left numpy's error state changed"
+
+
+@pytest.fixture(autouse=True)
+def no_leaked_threads() -> Iterator[None]:
+    """Fail a test that leaves a Python or Qt thread running."""
+    before = set(threading.enumerate())
+    yield
+    leaked = [thread for thread in threading.enumerate() if thread not in before and not _ended(thread)]
+    names = [f"{thread.name} ({type(thread).__name__})" for thread in leaked]
+    names += [f"{thread!r} (QThread)" for thread in _running_qthreads()]
+    assert not names, f"threads left running: {', '.join(names)}"
+
+
+def _ended(thread: threading.Thread) -> bool:
+    """Whether a thread ends within the grace that one already told to stop needs."""
+    # A thread Python did not start stands in as a dummy for as long as the process lives.
+    if type(thread).__name__ == "_DummyThread":
+        return True
+    thread.join(_THREAD_GRACE_S)
+    return not thread.is_alive()
+
+
+def _running_qthreads() -> list[object]:
+    qt = sys.modules.get("PySide6.QtCore")
+    if qt is None:
+        return []
+    main = qt.QThread.currentThread()
+    threads = [thing for thing in gc.get_objects() if isinstance(thing, qt.QThread) and thing is not main]
+    return [thread for thread in threads if thread.isRunning() and not thread.wait(int(1000 * _THREAD_GRACE_S))]
+
+
+@pytest.fixture
+def no_leaked_vtk() -> Iterator[None]:
+    """Fail a test that keeps a VTK render window alive: for the tests that draw."""
+    before = _render_windows()
+    yield
+    gc.collect()
+    leaked = [window for window in _render_windows() if window not in before]
+    assert not leaked, f"VTK render windows left alive: {', '.join(sorted(str(window()) for window in leaked))}"
+
+
+def _render_windows() -> set[weakref.ref]:
+    rendering = sys.modules.get("vtkmodules.vtkRenderingCore")
+    if rendering is None:
+        return set()
+    return {weakref.ref(thing) for thing in gc.get_objects() if isinstance(thing, rendering.vtkRenderWindow)}
