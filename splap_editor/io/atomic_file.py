@@ -1,0 +1,89 @@
+"""Files that are replaced whole or not at all."""
+
+import contextlib
+import errno
+import os
+import secrets
+import stat
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+
+@contextlib.contextmanager
+def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
+    """Open a file for writing that takes its name only once it is complete.
+
+    The bytes go to a temporary file in the same directory. Leaving the block
+    flushes them to the disk and renames the file over ``path``; leaving it by
+    an exception removes the temporary file and leaves ``path`` as it was. A
+    killed process can leave a ``.name.*.part`` file behind, never a broken
+    ``path``.
+
+    Parameters
+    ----------
+    path : path
+        The file to create or replace. A symbolic link is followed, so the
+        link stays and its target is replaced. An existing file keeps its
+        permission bits; a new one gets the usual ones.
+
+    Yields
+    ------
+    BinaryIO
+        Where to write. It may be the file being read: whoever has the old one
+        open or mapped keeps the old bytes.
+
+    Raises
+    ------
+    OSError
+        If the directory cannot be written to, the disk is full and so on.
+    """
+    target = Path(os.path.realpath(path))
+    mode = _mode_to_keep(target)
+    temporary = target.with_name(f".{target.name[:80]}.{secrets.token_hex(6)}.part")
+    # 0o666 is cut down by the umask, as for any new file.
+    handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            yield file
+            file.flush()
+            if mode is not None and hasattr(os, "fchmod"):
+                os.fchmod(file.fileno(), mode)
+            os.fsync(file.fileno())
+        os.replace(temporary, target)
+    except BaseException:
+        with contextlib.suppress(FileNotFoundError):
+            os.unlink(temporary)
+        raise
+    _sync_directory(target.parent)
+
+
+def _mode_to_keep(target: Path) -> int | None:
+    """Permission bits of the file to be replaced, None if there is none yet.
+
+    Renaming would put a plain file in the place of a device or a directory,
+    and would ignore a write protection: both are refused here.
+    """
+    try:
+        mode = target.stat().st_mode
+    except FileNotFoundError:
+        return None
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
+    if not stat.S_ISREG(mode):
+        raise OSError(errno.EINVAL, "Not a regular file", str(target))
+    if not os.access(target, os.W_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(target))
+    return stat.S_IMODE(mode)
+
+
+def _sync_directory(directory: Path) -> None:
+    """Make the rename itself survive a power cut, where the system can."""
+    if os.name != "posix":
+        return
+    with contextlib.suppress(OSError):
+        handle = os.open(directory, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)

@@ -1,0 +1,104 @@
+"""What is odd about the splats of a file."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from splap_editor.core.splats import Splats
+
+GIANT = 0.25
+"""A splat is giant if one standard deviation is longer than this share of the scene's inner 98 % box."""
+
+
+@dataclass(frozen=True, eq=False)
+class Finding:
+    """Something odd about some splats.
+
+    Parameters
+    ----------
+    kind : str
+        ``"scales"``, ``"opacities"``, ``"rotations"``, ``"zero_rotations"``,
+        ``"filters"``, ``"thresholds"``, ``"duplicates"``, ``"giants"`` or
+        ``"all_zero"``.
+    sentence : str
+        What it is, with the number of rows.
+    rows : (n,) int64
+        File rows concerned, ascending.
+    """
+
+    kind: str
+    sentence: str
+    rows: NDArray[np.int64]
+
+
+def unusable_rows(splats: Splats) -> list[Finding]:
+    """Rows that cannot be drawn or deformed: not finite, or without a rotation.
+
+    Infinite opacity (opaque) and scales of ``-inf`` (flat) are legal. One pass
+    over each small column; nothing is converted.
+    """
+    scales, quats = splats.log_scales, splats.quats
+    opacities = splats.logit_opacities
+    findings = []
+    if not _finite(scales):
+        bad = (np.isnan(scales) | (scales == np.inf)).any(axis=1)
+        _add(findings, "scales", "{} a scale that is not a number or infinite", bad)
+    if not _finite(opacities):
+        _add(findings, "opacities", "{} an opacity that is not a number", np.isnan(opacities))
+    if not _finite(quats):
+        _add(findings, "rotations", "{} a rotation that is not finite", ~np.isfinite(quats).all(axis=1))
+    zero = np.flatnonzero(quats[:, 0] == 0)
+    zero = zero[(quats[zero] == 0).all(axis=1)]
+    if len(zero):
+        findings.append(Finding("zero_rotations", _sentence("{} a zero rotation", len(zero)), zero))
+    if splats.filter_radii is not None:
+        _add(findings, "filters", "{} a filter_3D that is not finite", ~np.isfinite(splats.filter_radii))
+    return findings
+
+
+def lint(splats: Splats) -> list[Finding]:
+    """Everything odd about the splats, worst first.
+
+    Beside `unusable_rows`: rows that are zero throughout, positions that occur
+    more than once (every row after the first), and giant splats (longer than
+    `GIANT` of the box that holds the middle 98 % of centres along each axis).
+    Takes about a second per million splats.
+    """
+    findings = unusable_rows(splats)
+    means = np.ascontiguousarray(splats.means)
+    at_origin = (means == 0).all(axis=1)
+    blank = at_origin & (np.asarray(splats.log_scales) == 0).all(axis=1) & (np.asarray(splats.quats) == 0).all(axis=1)
+    _add(findings, "all_zero", "{} zeros in every column", blank)
+    order = np.lexsort(means.T)
+    same = (means[order[1:]] == means[order[:-1]]).all(axis=1)
+    # A stable sort keeps file order among equals, so the first of them is spared.
+    duplicates = np.zeros(len(means), bool)
+    duplicates[order[1:]] = same
+    _add(findings, "duplicates", "{} the position of an earlier splat", duplicates)
+    low, high = np.percentile(means, [1, 99], axis=0)
+    side = (high - low).max()
+    if side > 0:
+        giant = np.asarray(splats.log_scales).max(axis=1) > np.log(GIANT * side)
+        _add(findings, "giants", f"{{}} a size above {GIANT:.0%} of the scene", giant)
+    if splats.thresholds is not None:
+        cut = np.asarray(splats.thresholds) >= 1
+        _add(findings, "thresholds", "{} a threshold of 1 or more and cannot be seen", cut)
+    return findings
+
+
+def _finite(values: NDArray) -> bool:
+    """Whether every value is finite."""
+    return bool(np.isfinite(values).all())
+
+
+def _add(findings: list[Finding], kind: str, template: str, mask: NDArray[np.bool_]) -> None:
+    """Append a finding unless the mask is empty."""
+    rows = np.flatnonzero(mask)
+    if len(rows):
+        findings.append(Finding(kind, _sentence(template, len(rows)), rows))
+
+
+def _sentence(template: str, count: int) -> str:
+    """Sentence with the number of splats as its subject."""
+    return template.format(f"{count:,} splats have" if count > 1 else "1 splat has")

@@ -1,0 +1,238 @@
+"""Splat files: any trainer's PLY to splats and, with only what changed changed, back."""
+
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from splap_editor.core.progress import Progress, no_progress, part_of
+from splap_editor.core.splats import Splats
+from splap_editor.io.atomic_file import atomic_file
+from splap_editor.io.layouts import Layout, layout_of
+from splap_editor.io.lint import unusable_rows
+from splap_editor.io.ply_header import PlyError, PlyHeader
+from splap_editor.io.ply_table import NewColumn, PlyTable, read_table
+from splap_editor.io.splat_cells import SplatCells, plain_table
+from splap_editor.io.splat_columns import require_splat_columns, splat_columns, splats_of
+from splap_editor.io.thresholds import Thresholds, read_thresholds, sibling_npz
+
+__all__ = ["PlyError", "SplatFile", "read_ply", "write_ply"]
+
+THIN_LOG_SCALE = float(np.log(1e-6))
+"""Third log-scale given to 2DGS splats on their way to 3DGS programs."""
+
+
+@dataclass(frozen=True, eq=False)
+class SplatFile:
+    """A splat PLY in memory.
+
+    Parameters
+    ----------
+    path : Path
+        Where it was read from.
+    splats : Splats
+        Its splats in file order; arrays may be views into ``table``.
+    table : PlyTable
+        Its bytes and columns.
+    layout : Layout
+        Which trainer wrote it, how that was recognised, what its columns mean.
+    warnings : tuple of str
+        Sentences about what is odd; such rows are kept as they are.
+    """
+
+    path: Path
+    splats: Splats
+    table: PlyTable
+    layout: Layout
+    warnings: tuple[str, ...]
+
+
+def read_ply(path: str | os.PathLike[str], *, layout: str | None = None, progress: Progress = no_progress) -> SplatFile:
+    """Read a splat PLY of any trainer.
+
+    The rows are read once and left as they are: unless the file has odd types,
+    byte order or column order, the arrays of the splats are views.
+
+    Parameters
+    ----------
+    path : path
+        A PLY file: binary of either byte order, ascii, or SuperSplat's compressed.
+    layout : str, optional
+        Name in `splap_editor.io.layouts.LAYOUTS` to use instead of the one recognised.
+    progress : Progress
+        Told the share done; may cancel.
+
+    Raises
+    ------
+    PlyError
+        If the file cannot be read or holds no usable splats; the message is
+        one sentence for the user and what to do.
+    """
+    path = Path(path)
+    table = read_table(path, accepts=_require_splats, progress=part_of(progress, 0.0, 0.9))
+    npz = sibling_npz(path)
+    thresholds: list[Thresholds | str] = []
+
+    def has_thresholds() -> bool:
+        if npz is not None and not thresholds:
+            thresholds.append(read_thresholds(npz, table.n_rows))
+        return bool(thresholds) and isinstance(thresholds[0], Thresholds)
+
+    found = layout_of(table, chosen=layout, has_thresholds=has_thresholds)
+    warnings = []
+    if found.name == "supersplat-compressed":
+        from splap_editor.io.compressed_ply import decompressed
+
+        splats = decompressed(table)
+    else:
+        spiking = found.name == "spikinggs"
+        usable = thresholds[0] if spiking and has_thresholds() else None
+        if spiking and usable is None:
+            warnings.append(thresholds[0] if thresholds else _NO_THRESHOLDS.format(path.stem))
+        splats = splats_of(
+            table,
+            splat_columns(table, found),
+            found,
+            thresholds=usable and usable.cutoffs,
+            opacity_floor=usable.opacity_floor if usable else 0.0,
+        )
+    _require_finite_positions(splats.means, path.name)
+    if found.bound:
+        warnings.append(_BOUND.format(found.name))
+    warnings += [f"{finding.sentence}; left as they are." for finding in unusable_rows(splats)]
+    progress(1.0)
+    return SplatFile(path, splats, table, found, tuple(warnings))
+
+
+_NO_THRESHOLDS = (
+    "SpikingGS keeps its thresholds in an .npz file and none lies beside this one: splats are taken to reach as far as "
+    "without. Put {0}.npz or point_cloud.npz of the same iteration beside it."
+)
+_BOUND = (
+    "This file is of {0}, whose splats are bound to a mesh that it does not hold: what you see may not be the object."
+)
+
+
+def _require_splats(header: PlyHeader, name: str) -> None:
+    """Refuse a header that describes no splats."""
+    require_splat_columns(header.element("vertex"), header.elements, name)
+
+
+def _require_finite_positions(means: NDArray[np.floating], name: str) -> None:
+    """Refuse positions that are infinite or no numbers."""
+    finite = np.isfinite(means)
+    if not finite.all():
+        bad = np.flatnonzero(~finite.all(axis=1))
+        raise PlyError(
+            f"{name} has {len(bad):,} splats whose position is not finite, the first in row {bad[0]:,}. "
+            "Remove them in a splat viewer or export the file again."
+        )
+
+
+def write_ply(
+    path: str | os.PathLike[str],
+    file: SplatFile,
+    splats: Splats,
+    *,
+    as_3dgs: bool = False,
+    extra: Mapping[str, ArrayLike] | None = None,
+    progress: Progress = no_progress,
+) -> None:
+    """Write splats as the file they came from, with only what changed changed.
+
+    Rows, columns, types, their order, comments and extra elements stay; a cell
+    is written only where ``splats`` differs from ``file.splats``, so unedited
+    splats give the identical bytes. A changed rotation is written with the
+    length the file's quaternion had, and turns the row's normal if that is a
+    unit vector. SuperSplat's compressed form is kept for unedited splats only:
+    deformed ones are written as a plain 3DGS file. The target appears whole or
+    not at all, and may be the file that was read.
+
+    Parameters
+    ----------
+    path : path
+        File to create or replace.
+    file : SplatFile
+        What `read_ply` returned.
+    splats : Splats
+        Its splats, deformed: same number, scales and degree.
+    as_3dgs : bool
+        Give 2DGS splats a third scale of 1e-6, for programs that know only 3DGS.
+    extra : dict of (N,) float, optional
+        Columns to add at the end, by name.
+    progress : Progress
+        Told the share of rows written; cancelling leaves the old file.
+
+    Raises
+    ------
+    PlyError
+        If the file cannot be written.
+    ValueError
+        If ``splats`` or ``extra`` do not match the file.
+    """
+    _require_same_shape(splats, file.splats)
+    table, rest = file.table, file.splats
+    if file.layout.name == "supersplat-compressed":
+        cells = SplatCells(None, file.layout, rest, splats)
+        if as_3dgs or extra or cells.any_changed():
+            table = plain_table(table.name, splats)
+            rest = splats
+    columns = None if "packed_position" in table.columns else splat_columns(table, file.layout)
+    cells = SplatCells(columns, file.layout, rest, splats, table)
+    added = _added_columns(table, as_3dgs, extra or {})
+    header = table.header.with_columns([(column.after, column.name) for column in added])
+    blocks = table.blocks(cells.changes, added)
+    _write_blocks(Path(path), header, blocks, table.body.nbytes, progress)
+
+
+def _write_blocks(
+    path: Path, header: bytes, blocks: Iterator[NDArray[np.uint8] | bytes], n_bytes: int, progress: Progress
+) -> None:
+    """Write header and blocks to an atomic file, errors as sentences."""
+    written, next_report = 0, 0.0
+    try:
+        with atomic_file(path) as out:
+            out.write(header)
+            for block in blocks:
+                data = block if isinstance(block, bytes) else np.ascontiguousarray(block).data.cast("B")
+                out.write(data)
+                written += len(data)
+                if written >= next_report * n_bytes:
+                    progress(min(written / max(n_bytes, 1), 1.0))
+                    next_report += 0.05
+    except FileNotFoundError:
+        raise PlyError(f"{path} cannot be written: the directory {path.parent} does not exist. Create it.") from None
+    except OSError as error:
+        raise PlyError(
+            f"{path} cannot be written: {error.strerror or error}. Free some space or choose another place; "
+            "what was there is unchanged."
+        ) from error
+
+
+def _require_same_shape(splats: Splats, rest: Splats) -> None:
+    """Refuse splats that are not those of the file."""
+    for part in ("means", "log_scales", "quats", "logit_opacities", "sh0", "shN"):
+        got, wanted = np.shape(getattr(splats, part)), np.shape(getattr(rest, part))
+        if got != wanted:
+            raise ValueError(f"splats.{part} must have the file's shape {wanted}, got {got}")
+
+
+def _added_columns(table: PlyTable, as_3dgs: bool, extra: Mapping[str, ArrayLike]) -> list[NewColumn]:
+    """Columns to add to the file."""
+    added = []
+    if as_3dgs and "scale_2" not in table.columns and "scale_1" in table.columns:
+        added.append(NewColumn("scale_1", "scale_2", np.full(table.n_rows, THIN_LOG_SCALE, np.float32)))
+    last = table.header.element("vertex").names[-1]
+    for name, values in extra.items():
+        values = np.asarray(values, np.float32)
+        if values.shape != (table.n_rows,):
+            raise ValueError(f"extra[{name!r}] must have shape ({table.n_rows},), got {values.shape}")
+        if not name.isascii() or not name.isprintable() or name.split() != [name]:
+            raise ValueError(f"{name!r} cannot be a column name: use letters, digits and underscores")
+        if name in table.columns or any(column.name == name for column in added):
+            raise ValueError(f"the file has a column {name!r} already: choose another name")
+        added.append(NewColumn(last, name, values))
+    return added

@@ -1,0 +1,110 @@
+"""PLY files with list properties: read and written by plyfile, row by row."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from io import BytesIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from splap_editor.io.ply_header import PlyError, PlyHeader, ply_header
+from splap_editor.io.ply_table import CellChanges, NewColumn, PlyTable, cast_values
+
+
+@dataclass(frozen=True, eq=False)
+class ListTable(PlyTable):
+    """A PLY file with lists somewhere: its rows differ in size.
+
+    Parameters
+    ----------
+    elements : dict of structured arrays
+        Every element by name; list cells are arrays.
+    tail : bytes
+        What follows the last element, kept.
+    """
+
+    elements: dict[str, NDArray] | None = None
+    tail: bytes = b""
+
+    def element(self, name: str) -> NDArray | None:
+        """Return the rows of an element, None if there is none of that name."""
+        return self.elements.get(name)
+
+    def blocks(
+        self, changes: Callable[[int, int], CellChanges], new_columns: list[NewColumn]
+    ) -> Iterator[NDArray[np.uint8] | bytes]:
+        """Yield the body with some cells replaced, in one piece."""
+        changed = changes(0, self.n_rows)
+        if not changed and not new_columns:
+            yield self.body
+            return
+        rows = self.elements["vertex"].copy()
+        for name, (where, values) in changed.items():
+            rows[name][where] = cast_values(values, rows.dtype[name])
+        yield _body(self.header, {**self.elements, "vertex": _with_columns(rows, new_columns)})
+        yield self.tail
+
+
+def list_table(name: str, header: PlyHeader, body: NDArray[np.uint8]) -> ListTable:
+    """Parse a file whose rows differ in size.
+
+    Raises
+    ------
+    PlyError
+        If the rows end early or do not parse.
+    """
+    import plyfile
+
+    plain = _plain_header(header)
+    stream = BytesIO(plain + body.tobytes())
+    try:
+        ply = plyfile.PlyData.read(stream)
+    except (plyfile.PlyParseError, ValueError, EOFError, OverflowError) as error:
+        raise PlyError(f"{name} is damaged or cut short ({error}). Copy or export it again.") from error
+    elements = {element.name: element.data for element in ply.elements}
+    scalar = [p.name for p in header.element("vertex").properties if p.length_type is None]
+    columns = {column: elements["vertex"][column] for column in scalar}
+    tail = b"" if header.is_ascii else body[stream.tell() - len(plain) :].tobytes()
+    return ListTable(name, header, body, columns, elements, tail)
+
+
+def _plain_header(header: PlyHeader) -> bytes:
+    """Header without comments and with plain line ends, which every reader takes."""
+    lines = [line.strip() for line in header.raw.splitlines()]
+    return b"\n".join(line for line in lines if line.split()[:1] not in ([b"comment"], [b"obj_info"], [])) + b"\n"
+
+
+def _with_columns(rows: NDArray, new_columns: list[NewColumn]) -> NDArray:
+    """Rows with float columns added after existing ones."""
+    fields = []
+    for name in rows.dtype.names:
+        fields.append((name, rows.dtype[name]))
+        fields += [(c.name, np.dtype("f4")) for c in new_columns if c.after == name]
+    wide = np.empty(len(rows), fields)
+    for name in rows.dtype.names:
+        wide[name] = rows[name]
+    for column in new_columns:
+        wide[column.name] = column.values
+    return wide
+
+
+def _body(header: PlyHeader, elements: dict[str, NDArray]) -> bytes:
+    """Bytes of the elements in the header's format and order, with its list types."""
+    import plyfile
+
+    described = []
+    for element in header.elements:
+        lists = [p for p in element.properties if p.length_type]
+        described.append(
+            plyfile.PlyElement.describe(
+                elements[element.name],
+                element.name,
+                len_types={p.name: p.length_type for p in lists},
+                val_types={p.name: p.type for p in lists},
+            )
+        )
+    order = header.byte_order
+    stream = BytesIO()
+    plyfile.PlyData(described, text=header.is_ascii, byte_order=order).write(stream)
+    data = stream.getvalue()
+    return data[len(ply_header(data, "").raw) :]
