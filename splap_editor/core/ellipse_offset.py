@@ -242,7 +242,7 @@ def _touch_scales(rows, pairs, epsilon):
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")
 def _reaches_height(height, c0, c1, a00, a01, a10, a11, z0, g0, g1):
-    """Whether the part of Ω_j above Ω_i has a point at this height: do two intervals of its chord overlap?"""
+    """Whether the part of Ω_j above Ω_i has a point at this height: two intervals of its chord overlap."""
     squared = g0 * g0 + g1 * g1
     foot = (height - z0) / squared
     y0, y1 = foot * g0, foot * g1

@@ -141,7 +141,9 @@ def occupancy_ellipses(splats: Splats, *, min_contribution: float = MIN_CONTRIBU
     cutoffs = np.sqrt(-2.0 * np.log(levels[rows]))
     axes = axes[rows]
     columns = np.take_along_axis(
-        quats_to_matrices(np.asarray(splats.quats[rows], np.float64)).swapaxes(1, 2), axes[:, :, None].astype(int), axis=1
+        quats_to_matrices(np.asarray(splats.quats[rows], np.float64)).swapaxes(1, 2),
+        axes[:, :, None].astype(int),
+        axis=1,
     )
     major = cutoffs * sigmas[rows, 0]
     minor = np.maximum(cutoffs * sigmas[rows, 1], NEEDLE_FLOOR * major)
