@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.handle_nodes import Region
-from splap_editor.core.rotations import quats_to_matrices
+from splap_editor.core.rotations import matrices_to_quats, quats_to_matrices
 from splap_editor.core.splat_graph import GraphOptions
 from splap_editor.io.recipe import SolverSpec
 
@@ -44,6 +44,22 @@ class Pose:
         transform[:3, :3] = self.scale * quats_to_matrices(np.array([self.rotate]))[0]
         transform[:3, 3] = center + np.array(self.translate) - transform[:3, :3] @ center
         return transform
+
+    def moved(self, delta: NDArray[np.float64], center: NDArray[np.float64]) -> "Pose":
+        """Follow the pose by a world similarity.
+
+        Parameters
+        ----------
+        delta : (4, 4) float64
+            Rotation times a uniform positive scale, and a translation.
+        center : (3,) float64
+            The centre that the pose turns about.
+        """
+        scale = float(np.cbrt(np.linalg.det(delta[:3, :3])))
+        turn = delta[:3, :3] / scale @ quats_to_matrices(np.array([self.rotate]))[0]
+        at = delta[:3, :3] @ (center + np.array(self.translate)) + delta[:3, 3] - center
+        quat = matrices_to_quats(turn[None])[0]
+        return Pose(tuple(at.tolist()), tuple(quat.tolist()), self.scale * scale)
 
 
 @dataclass(frozen=True, eq=False)

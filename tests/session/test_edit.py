@@ -1,0 +1,62 @@
+"""Laws of poses and edits."""
+
+import numpy as np
+
+from splap_editor.core.handle_nodes import Region
+from splap_editor.core.rotations import quats_to_matrices
+from splap_editor.session.edit import Edit, Handle, Pose, binds_like, poses_like
+
+
+def similarity(rng):
+    quat = rng.normal(size=4)
+    quat /= np.linalg.norm(quat)
+    transform = np.eye(4)
+    transform[:3, :3] = rng.uniform(0.5, 2.0) * quats_to_matrices(quat[None])[0]
+    transform[:3, 3] = rng.normal(size=3)
+    return transform
+
+
+def handle(handle_id=1, center=(1.0, 2.0, 3.0), pose=None):
+    return Handle(handle_id, "h", "#ffffff", Region(np.array(center), 0.1), pose or Pose())
+
+
+def test_the_rest_pose_moves_nothing():
+    np.testing.assert_array_equal(Pose().matrix(np.array([1.0, 2.0, 3.0])), np.eye(4))
+    assert Pose().is_identity
+
+
+def test_moving_a_pose_composes_world_transforms():
+    rng = np.random.default_rng(1)
+    center = rng.normal(size=3)
+    pose = Pose()
+    expected = np.eye(4)
+    for _ in range(5):
+        delta = similarity(rng)
+        pose = pose.moved(delta, center)
+        expected = delta @ expected
+        np.testing.assert_allclose(pose.matrix(center), expected, atol=1e-12 * np.abs(expected).max())
+
+
+def test_an_edit_never_changes():
+    edit = Edit().with_handle(handle())
+    posed = edit.with_poses({1: Pose((1.0, 0.0, 0.0))})
+    assert edit.is_identity and not posed.is_identity
+    assert posed.handle(1).region is edit.handle(1).region
+    assert posed.without_handles([1]).handles == ()
+    assert edit.next_handle_id() == 2
+
+
+def test_a_pose_change_needs_no_new_binding():
+    edit = Edit().with_handle(handle())
+    posed = edit.with_poses({1: Pose((1.0, 0.0, 0.0))})
+    assert binds_like(edit, posed) and not poses_like(edit, posed)
+    assert not binds_like(edit, edit.with_handle(handle(2)))
+
+
+def test_a_disabled_handle_neither_binds_nor_poses():
+    from dataclasses import replace
+
+    edit = Edit().with_handle(handle())
+    both = edit.with_handle(replace(handle(2, pose=Pose((5.0, 0.0, 0.0))), enabled=False))
+    assert binds_like(edit, both) and poses_like(edit, both)
+    assert both.transforms.shape == (1, 4, 4)
