@@ -80,7 +80,7 @@ def no_leaked_vtk() -> Iterator[None]:
     yield
     gc.collect()
     leaked = [window for window in _render_windows() if window not in before]
-    assert not leaked, f"VTK render windows left alive: {', '.join(sorted(str(window()) for window in leaked))}"
+    assert not leaked, f"VTK render windows left alive: {', '.join(sorted(type(window()).__name__ for window in leaked))}"
 
 
 def _render_windows() -> set[weakref.ref]:

@@ -46,13 +46,13 @@ class SplatStyle:
         Degree of the colour coefficients, 0 to 3.
     """
 
-    coverage: float = 1.5
-    jitter: float = 0.1
-    aspect: float = 1.4
-    size_spread: float = 0.2
-    aspect_spread: float = 0.2
-    overhang: float = 0.3
-    tilt: float = 2.0
+    coverage: float = 2.0
+    jitter: float = 0.3
+    aspect: float = 1.5
+    size_spread: float = 0.25
+    aspect_spread: float = 0.25
+    overhang: float = 0.5
+    tilt: float = 3.0
     depth: float = 0.0
     opacities: tuple[float, float, float] = (0.8, 0.97, 0.999)
     sh_degree: int = 1
