@@ -45,7 +45,7 @@ class Surface:
     neighborhoods : Neighborhoods
     triangles : (T, 3) int32
         Local Delaunay stars.
-    L : (n, n) csr_matrix
+    L : (n, n) csr_array
         Positive semidefinite Laplacian.
     M : (n,) float64
         Lumped areas.
@@ -59,7 +59,7 @@ class Surface:
     graph: SplatGraph
     neighborhoods: Neighborhoods
     triangles: NDArray[np.int32]
-    L: sp.csr_matrix
+    L: sp.csr_array
     M: NDArray[np.float64]
     binding: KernelBinding
     options: GraphOptions
@@ -111,7 +111,7 @@ def surface_of(
             neighborhoods = geodesic_neighbors(graph, options.k, progress=stages("geodesics"))
         with timed("laplacian"):
             triangles = local_triangulations(ellipses, neighborhoods, progress=stages("laplacian"))
-            L, M = point_cloud_laplacian(ellipses.centers, triangles)
+            L, M = point_cloud_laplacian(ellipses.centers, triangles, graph=graph)
         if cache is not None:
             cache.store(key, _packed(graph, neighborhoods, triangles, L, M))
     else:
@@ -226,5 +226,5 @@ def _unpacked(kept: Arrays):
     )
     neighborhoods = Neighborhoods(kept["near_indptr"], kept["near_indices"], kept["near_distances"])
     n = len(kept["M"])
-    L = sp.csr_matrix((kept["L_data"], kept["L_indices"], kept["L_indptr"]), shape=(n, n))
+    L = sp.csr_array((kept["L_data"], kept["L_indices"], kept["L_indptr"]), shape=(n, n))
     return graph, neighborhoods, kept["triangles"], L, kept["M"]

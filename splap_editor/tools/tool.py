@@ -7,6 +7,9 @@ from splap_editor.session.session import Session
 from splap_editor.session.signals import Signal
 from splap_editor.viewport.viewport import Viewport
 
+CLICK_SLACK_PX = 5.0
+"""A press that moves less before the release is a click."""
+
 
 @dataclass(frozen=True)
 class PointerEvent:
@@ -91,11 +94,12 @@ class Hud:
 
 @dataclass(eq=False)
 class ToolContext:
-    """What every tool works on."""
+    """What every tool works on; ``navigate`` takes over a drag that turns out to be one of the camera."""
 
     session: Session
     viewport: Viewport
     hud: Hud = field(default_factory=Hud)
+    navigate: "Tool | None" = None
 
 
 class Tool(Protocol):
@@ -137,6 +141,7 @@ class ToolManager:
 
     def __init__(self, context: ToolContext, tools: dict[str, Tool], standing: tuple[Tool, ...], navigation: Tool):
         self.context = context
+        context.navigate = navigation
         self.tools = tools
         self.chosen_changed = Signal()
         self._standing = standing

@@ -1,0 +1,65 @@
+"""Where a new handle or pin goes: a disc on the surface, held at the pose it has on screen."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from splap_editor.core.geodesics import geodesic_distances
+from splap_editor.core.handle_nodes import Region
+from splap_editor.core.rotation_fit import fit_rotations
+from splap_editor.core.rotations import matrices_to_quats
+from splap_editor.session.edit import Pose
+from splap_editor.session.scene import Scene
+
+
+def disc_rows(scene: Scene, row: int, radius: float) -> NDArray[np.int64]:
+    """File rows of the active splats within a geodesic radius of one.
+
+    Measured along the splat graph, so a disc on one slat does not reach the
+    next; as the crow flies while there is no graph yet.
+
+    Parameters
+    ----------
+    scene : Scene
+    row : int
+        The splat in the middle; an inert one gives itself alone.
+    radius : float
+        World units.
+
+    Returns
+    -------
+    (k,) int64
+        Ascending, never empty.
+    """
+    ellipses = scene.ellipses
+    node = int(ellipses.node_of_row[row])
+    if node < 0:
+        return np.array([row], np.int64)
+    near = np.linalg.norm(ellipses.centers - ellipses.centers[node], axis=1) <= radius
+    if scene.surface is not None:
+        near = geodesic_distances(scene.surface.graph, np.array([node]), limit=radius) <= radius
+    near[node] = True
+    return np.sort(ellipses.rows[near])
+
+
+def rows_region(scene: Scene, rows: NDArray[np.int64]) -> Region:
+    """Region of given file rows about the mean of their rest positions, as a recipe has it."""
+    rows = np.unique(np.asarray(rows, np.int64))
+    return Region(np.asarray(scene.splats.means, np.float64)[rows].mean(axis=0), 0.0, rows)
+
+
+def held_pose(scene: Scene, region: Region) -> Pose:
+    """Find the rigid pose that holds a region where it is on screen, so that a handle placed there moves nothing."""
+    if scene.kernels is None or region.rows is None:
+        return Pose()
+    rest = np.asarray(scene.splats.means, np.float64)[region.rows]
+    posed = scene.kernels.means[region.rows]
+    if np.allclose(rest, posed, rtol=0.0, atol=1e-9 * scene.ellipses.scene_scale):
+        return Pose()
+    center, moved = rest.mean(axis=0), posed.mean(axis=0)
+    covariance = (rest - center).T @ (posed - moved)
+    # The splats' own turns decide where their positions do not: one splat, or several in a line.
+    spread = np.trace((rest - center).T @ (rest - center))
+    covariance += (0.01 * spread + 1e-12) * scene.kernels.rotations[region.rows].mean(axis=0).T
+    rotation = fit_rotations(covariance[None])[0]
+    quat = matrices_to_quats(rotation[None])[0]
+    return Pose(tuple((moved - center).tolist()), tuple(quat.tolist()))
