@@ -39,7 +39,7 @@ class SplatFile:
         Its bytes and columns.
     layout : Layout
         Which trainer wrote it, how that was recognised, what its columns mean.
-    warnings : tuple of str
+    warnings : list of str
         Sentences about what is odd; such rows are kept as they are.
     """
 
@@ -47,7 +47,7 @@ class SplatFile:
     splats: Splats
     table: PlyTable
     layout: Layout
-    warnings: tuple[str, ...]
+    warnings: list[str]
 
 
 def read_ply(path: str | os.PathLike[str], *, layout: str | None = None, progress: Progress = no_progress) -> SplatFile:
@@ -104,7 +104,7 @@ def read_ply(path: str | os.PathLike[str], *, layout: str | None = None, progres
         warnings.append(_BOUND.format(found.name))
     warnings += [f"{finding.sentence}; left as they are." for finding in unusable_rows(splats)]
     progress(1.0)
-    return SplatFile(path, splats, table, found, tuple(warnings))
+    return SplatFile(path, splats, table, found, warnings)
 
 
 _NO_THRESHOLDS = (

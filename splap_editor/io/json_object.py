@@ -1,0 +1,173 @@
+"""JSON objects read key by key: each wrong value is refused with its path and what to put there."""
+
+import json
+import math
+from collections.abc import Callable, Iterator
+from difflib import get_close_matches
+from typing import Any
+
+Error = Callable[[str], ValueError]
+
+
+class JsonObject:
+    """One object of a JSON document and where it stands in it.
+
+    Parameters
+    ----------
+    value : object
+        What ``json`` made of it.
+    path : str
+        Where it is, as ``handles[0]``; empty for the document itself.
+    keys : tuple of str
+        The keys it may have; any other is refused with the nearest of them.
+    error : callable (sentence) → exception
+        Exception to raise.
+    """
+
+    def __init__(self, value: Any, path: str, keys: tuple[str, ...], error: Error) -> None:
+        self._path = path
+        self._error = error
+        if not isinstance(value, dict):
+            raise error(f"{path or 'the document'} must be an object in braces, got {shown(value)}")
+        self._value = value
+        for key in value:
+            if key not in keys:
+                near = get_close_matches(str(key), keys, 1)
+                hint = f"did you mean {near[0]!r}?" if near else f"the keys are {', '.join(keys)}"
+                raise error(f"{self.at(key)} is not known: {hint}")
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._value
+
+    def at(self, key: str) -> str:
+        """Path of a key."""
+        return f"{self._path}.{key}" if self._path else str(key)
+
+    def is_null(self, key: str) -> bool:
+        """Whether the key is there and null."""
+        return key in self._value and self._value[key] is None
+
+    def refuse(self, key: str, wanted: str) -> ValueError:
+        """Exception for a value of a key that is not what is wanted."""
+        got = f"got {shown(self._value[key])}" if key in self._value else "it is missing"
+        return self._error(f"{self.at(key)} must be {wanted}, {got}")
+
+    def text(self, key: str, default: str) -> str:
+        """A string."""
+        value = self._value.get(key, default)
+        if not isinstance(value, str):
+            raise self.refuse(key, "text in quotes")
+        return value
+
+    def choice(self, key: str, choices: tuple[str, ...], default: str) -> str:
+        """One of some strings."""
+        value = self._value.get(key, default)
+        if not isinstance(value, str) or value not in choices:
+            raise self.refuse(key, " or ".join(f'"{choice}"' for choice in choices))
+        return value
+
+    def integer(self, key: str, default: int, *, low: int, high: int = 2**31 - 1) -> int:
+        """A whole number between bounds."""
+        value = self._value.get(key, default)
+        if not _is_integer(value) or not low <= value <= high:
+            raise self.refuse(key, f"a whole number, {low} " + (f"to {high}" if high < 2**31 - 1 else "or more"))
+        return int(value)
+
+    def number(self, key: str, default: float | None = None, *, above: float = -math.inf, least: bool = False) -> float:
+        """A finite number above a bound, or at least it; without a default it must be there."""
+        number = _finite(self._value.get(key, default))
+        if number is None or number < above or (number == above and not least):
+            bound = "" if above == -math.inf else f" of at least {above:g}" if least else f" greater than {above:g}"
+            raise self.refuse(key, f"a finite number{bound}")
+        return number
+
+    def vector(self, key: str, size: int, default: tuple[float, ...] | None = None) -> tuple[float, ...]:
+        """A list of finite numbers; without a default it must be there."""
+        value = self._value.get(key, default)
+        numbers = [_finite(item) for item in value] if isinstance(value, list | tuple) else []
+        if len(numbers) != size or None in numbers:
+            raise self.refuse(key, f"a list of {size} finite numbers")
+        return tuple(numbers)
+
+    def rows(self, key: str) -> tuple[int, ...]:
+        """A list of file rows with at least one in it."""
+        value = self._value.get(key)
+        if not isinstance(value, list | tuple) or not value:
+            raise self.refuse(key, "a list of row numbers with at least one in it")
+        for i, row in enumerate(value):
+            if not _is_integer(row) or not 0 <= row < 2**31:
+                raise self._error(f"{self.at(key)}[{i}] must be a row number, 0 or more, got {shown(row)}")
+        return tuple(int(row) for row in value)
+
+    def row_pairs(self, key: str) -> tuple[tuple[int, int], ...]:
+        """A list, perhaps empty, of pairs of different file rows."""
+        value = self._value.get(key, ())
+        if not isinstance(value, list | tuple):
+            raise self.refuse(key, "a list of [row, row] pairs")
+        for i, pair in enumerate(value):
+            fine = isinstance(pair, list | tuple) and len(pair) == 2 and all(_is_integer(row) for row in pair)
+            if not fine or not all(0 <= row < 2**31 for row in pair) or pair[0] == pair[1]:
+                raise self._error(f"{self.at(key)}[{i}] must be a pair of different row numbers, got {shown(pair)}")
+        return tuple((int(a), int(b)) for a, b in value)
+
+    def objects(self, key: str, keys: tuple[str, ...]) -> "Iterator[JsonObject]":
+        """Yield the objects of a list, which may be missing."""
+        value = self._value.get(key, ())
+        if not isinstance(value, list | tuple):
+            raise self.refuse(key, "a list of objects")
+        for i, item in enumerate(value):
+            yield JsonObject(item, f"{self.at(key)}[{i}]", keys, self._error)
+
+    def object(self, key: str, keys: tuple[str, ...]) -> "JsonObject":
+        """An object; a missing one is empty."""
+        return JsonObject(self._value.get(key, {}), self.at(key), keys, self._error)
+
+
+def parsed_json(data: bytes, error: Error) -> Any:
+    """Parse a JSON text, keys that stand twice refused.
+
+    Parameters
+    ----------
+    data : bytes
+        UTF-8, a byte-order mark allowed.
+    error : callable (sentence) → exception
+        Exception to raise.
+    """
+
+    def distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        found = dict(pairs)
+        if len(found) < len(pairs):
+            keys = [key for key, _ in pairs]
+            raise error(f"the key {next(k for k in keys if keys.count(k) > 1)!r} stands twice: remove one")
+        return found
+
+    try:
+        return json.loads(data.decode("utf-8-sig"), object_pairs_hook=distinct)
+    except json.JSONDecodeError as problem:
+        raise error(f"it is not JSON: {problem.msg} in line {problem.lineno}, column {problem.colno}") from None
+    except UnicodeDecodeError:
+        raise error("it is not text in UTF-8") from None
+    except RecursionError:
+        raise error("it is nested too deeply") from None
+
+
+def shown(value: Any) -> str:
+    """A value as JSON, cut to a glance."""
+    text = json.dumps(value, default=str)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _is_integer(value: Any) -> bool:
+    """Whether a value is a whole number; ``true`` is none."""
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
+def _finite(value: Any) -> float | None:
+    """Value as a float, None if it is no finite number; ``true`` is none."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    try:
+        number = float(value)
+    except OverflowError:
+        return None
+    return number if math.isfinite(number) else None

@@ -1,0 +1,246 @@
+"""Recipes: an edit as JSON, for scripts and for the window alike."""
+
+import json
+import math
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from splap_editor.io.atomic_file import atomic_file
+from splap_editor.io.json_object import JsonObject, parsed_json, shown
+from splap_editor.io.recipe_specs import DEFAULT_RADIUS, GraphSpec, HandleSpec, PinSpec, Recipe, SolverSpec, Vector
+
+__all__ = [
+    "DEFAULT_RADIUS",
+    "GraphSpec",
+    "HandleSpec",
+    "PinSpec",
+    "Recipe",
+    "RecipeError",
+    "SolverSpec",
+    "read_recipe",
+    "recipe_from_json",
+    "recipe_to_json",
+    "write_recipe",
+]
+
+VERSION = 1
+
+_RECIPE_KEYS = (
+    "version",
+    "method",
+    "graph",
+    "free_radius",
+    "handles",
+    "pins",
+    "solver",
+    "adaptation",
+    "hops",
+    "blending",
+)
+_REGION_KEYS = ("center", "radius", "rows")
+_HANDLE_KEYS = ("name", *_REGION_KEYS, "translate", "rotate", "scale", "cage_radius")
+_GRAPH_KEYS = ("rule", "epsilon", "k", "cut", "add")
+_SOLVER_KEYS = ("kind", "tolerance", "iterations", "smoothness")
+
+
+class RecipeError(ValueError):
+    """A recipe that cannot be read; the message names the key and says what to put there."""
+
+
+def read_recipe(path: str | os.PathLike[str]) -> Recipe:
+    """Read a recipe.
+
+    Raises
+    ------
+    RecipeError
+        If the file cannot be read or is not a recipe; the message is one
+        sentence with the file, the key and what to put there.
+    """
+    path = Path(path)
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise RecipeError(f"{path} cannot be read: {error.strerror or error}. Check the path.") from error
+    try:
+        return recipe_from_json(parsed_json(data, RecipeError))
+    except RecipeError as error:
+        raise RecipeError(f"{path.name}: {error}.") from None
+
+
+def write_recipe(path: str | os.PathLike[str], recipe: Recipe) -> None:
+    """Write a recipe, whole or not at all.
+
+    Raises
+    ------
+    RecipeError
+        If the file cannot be written, or could not be read again.
+    """
+    held = recipe_to_json(recipe)
+    recipe_from_json(held)
+    try:
+        with atomic_file(path) as file:
+            file.write(_text(held).encode())
+    except OSError as error:
+        raise RecipeError(f"{path} cannot be written: {error.strerror or error}. Choose another place.") from error
+
+
+def recipe_from_json(value: Any) -> Recipe:
+    """Make a recipe of what ``json`` parsed.
+
+    A missing key takes its default; rotations are normalised.
+
+    Raises
+    ------
+    RecipeError
+        For anything else than a recipe of this version: unknown keys, wrong
+        types, numbers out of range.
+    """
+    # The version comes first: a newer recipe may have keys that are no mistake.
+    if isinstance(value, dict):
+        version = value.get("version")
+        if version is None:
+            raise RecipeError(f'version is missing: put "version": {VERSION} into it')
+        if isinstance(version, bool) or version != VERSION:
+            raise RecipeError(
+                f"version must be {VERSION}, got {shown(version)}: a newer one needs a newer SpLap Editor"
+            )
+    recipe = JsonObject(value, "", _RECIPE_KEYS, RecipeError)
+    free_radius = None
+    if not recipe.is_null("free_radius"):
+        free_radius = recipe.number("free_radius", above=0) if "free_radius" in recipe else DEFAULT_RADIUS
+    return Recipe(
+        method=recipe.choice("method", ("arap", "bbw"), Recipe.method),
+        graph=_graph(recipe.object("graph", _GRAPH_KEYS)),
+        free_radius=free_radius,
+        handles=tuple(_handle(h, i) for i, h in enumerate(recipe.objects("handles", _HANDLE_KEYS))),
+        pins=tuple(PinSpec(*_region(pin)) for pin in recipe.objects("pins", _REGION_KEYS)),
+        solver=_solver(recipe.object("solver", _SOLVER_KEYS)),
+        adaptation=recipe.choice("adaptation", ("surface", "affine", "none"), Recipe.adaptation),
+        hops=recipe.integer("hops", Recipe.hops, low=1, high=3),
+        blending=recipe.choice("blending", ("dual-quaternion", "linear"), Recipe.blending),
+    )
+
+
+def _graph(graph: JsonObject) -> GraphSpec:
+    return GraphSpec(
+        rule=graph.choice("rule", ("touch", "paper"), GraphSpec.rule),
+        epsilon=graph.number("epsilon", GraphSpec.epsilon, above=0, least=True),
+        k=graph.integer("k", GraphSpec.k, low=3, high=1000),
+        cut=graph.row_pairs("cut"),
+        add=graph.row_pairs("add"),
+    )
+
+
+def _solver(solver: JsonObject) -> SolverSpec:
+    return SolverSpec(
+        kind=solver.choice("kind", ("converged", "local-global", "libigl"), SolverSpec.kind),
+        tolerance=solver.number("tolerance", SolverSpec.tolerance, above=0),
+        iterations=solver.integer("iterations", SolverSpec.iterations, low=1),
+        smoothness=solver.number("smoothness", SolverSpec.smoothness, above=0, least=True),
+    )
+
+
+def _region(region: JsonObject) -> tuple[Vector | None, float | None, tuple[int, ...] | None]:
+    """Center, radius and rows of a handle or pin."""
+    if "rows" not in region:
+        return region.vector("center", 3), region.number("radius", above=0), None
+    if "radius" in region:
+        raise region.refuse("radius", "left out where rows are given")
+    return region.vector("center", 3) if "center" in region else None, None, region.rows("rows")
+
+
+def _handle(handle: JsonObject, index: int) -> HandleSpec:
+    center, radius, rows = _region(handle)
+    rotate = handle.vector("rotate", 4, HandleSpec.rotate)
+    length = math.hypot(*rotate)
+    if not 0 < length < math.inf:
+        raise handle.refuse("rotate", "a quaternion w, x, y, z that is not zero")
+    if abs(length - 1) > 1e-12:
+        # Twice, since the length of very short ones is imprecise.
+        rotate = tuple(part / length for part in rotate)
+        rotate = tuple(part / math.hypot(*rotate) for part in rotate)
+    cage_radius = None
+    if not handle.is_null("cage_radius"):
+        cage_radius = handle.number("cage_radius", above=0) if "cage_radius" in handle else DEFAULT_RADIUS
+    return HandleSpec(
+        name=handle.text("name", f"handle {index + 1}"),
+        center=center,
+        radius=radius,
+        rows=rows,
+        translate=handle.vector("translate", 3, HandleSpec.translate),
+        rotate=rotate,
+        scale=_scale(handle),
+        cage_radius=cage_radius,
+    )
+
+
+def _scale(handle: JsonObject) -> float | Vector:
+    """One factor, or one for each world axis."""
+    try:
+        return handle.number("scale", HandleSpec.scale, above=0)
+    except RecipeError:
+        try:
+            scale = handle.vector("scale", 3)
+        except RecipeError:
+            scale = (0.0,)
+    if min(scale) <= 0:
+        raise handle.refuse("scale", "a number greater than 0, or three of them")
+    return scale
+
+
+def recipe_to_json(recipe: Recipe) -> dict[str, Any]:
+    """Plain objects of a recipe for ``json``; what is left at its default is left out."""
+    value: dict[str, Any] = {"version": VERSION, "method": recipe.method}
+    graph = _without_defaults(recipe.graph, GraphSpec())
+    if graph:
+        value["graph"] = graph
+    if not _is_default(recipe.free_radius):
+        value["free_radius"] = recipe.free_radius
+    # The region of a handle has no default, so it never goes missing.
+    value["handles"] = [{"name": h.name, **_without_defaults(h, HandleSpec(name=h.name))} for h in recipe.handles]
+    value["pins"] = [_without_defaults(pin, PinSpec()) for pin in recipe.pins]
+    value["solver"] = {"kind": recipe.solver.kind, **_without_defaults(recipe.solver, SolverSpec())}
+    value["adaptation"] = recipe.adaptation
+    for key in ("hops", "blending"):
+        if getattr(recipe, key) != getattr(Recipe, key):
+            value[key] = getattr(recipe, key)
+    return value
+
+
+def _is_default(radius: float | None) -> bool:
+    """Whether a radius is left to the program."""
+    return radius is not None and math.isnan(radius)
+
+
+def _without_defaults(spec: Any, default: Any) -> dict[str, Any]:
+    """Fields that differ from their default, numpy numbers as Python's."""
+    found = {}
+    for key, value in vars(spec).items():
+        usual = getattr(default, key)
+        if value is usual or (value is not None and usual is not None and value == usual):
+            continue
+        found[key] = _plain(value)
+    return found
+
+
+def _plain(value: Any) -> Any:
+    """Value with lists for tuples and Python's numbers for numpy's."""
+    if isinstance(value, tuple | list | np.ndarray):
+        return [_plain(item) for item in value]
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _text(value: dict[str, Any]) -> str:
+    """JSON with a line for each key, handle and pin."""
+
+    def line(item: Any) -> str:
+        return json.dumps(item, ensure_ascii=False, allow_nan=False)
+
+    lines = []
+    for key, item in value.items():
+        parts = ",\n  ".join(line(part) for part in item) if isinstance(item, list) else ""
+        lines.append(f' "{key}": ' + (f"[\n  {parts}\n ]" if parts else line(item)))
+    return "{\n" + ",\n".join(lines) + "\n}\n"
