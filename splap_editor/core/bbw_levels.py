@@ -48,7 +48,8 @@ def coarser_level(finer: Level, kept: NDArray[np.bool_], *, spacing: float = 2.0
 
     ``w_IJ = Σ w_ij (e_ij · d_IJ) / |d_IJ|²``  over fine edges ``e_ij`` from I to J, ``d_IJ`` between the centres,
 
-    which passes a linear function's flux through the cells' common border exactly. Masses add up.
+    the flux that a function rising steadily from one centre to the other sends through the cells' common border. Masses
+    add up.
 
     Parameters
     ----------

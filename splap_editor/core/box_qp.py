@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-import qdldl
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from splap_editor.core.linear_solvers import SpdFactor
 from splap_editor.core.progress import Progress, no_progress
 
 # Only unknowns that violate their bound by more than this share of the worst violation are put on it. Putting all of
@@ -145,7 +145,7 @@ def _active_set_minimiser(A, c, lower, upper, start, tolerance, max_factorisatio
         w = held
         if len(free):
             rows = A[free]
-            w[free] = _spd_factor(rows[:, free]).solve(-(c[free] + rows @ held))
+            w[free] = SpdFactor(rows[:, free]).solve(-(c[free] + rows @ held))
         step = np.inf if previous is None else np.abs(w - previous).max()
         previous = w
         outside = np.maximum(lower - w, w - upper)
@@ -174,7 +174,3 @@ def _interior_point_minimiser(A, c, lower, upper):
     if not np.isfinite(w).all():
         raise ArithmeticError("the bounded quadratic program has no finite minimiser: A is not positive definite")
     return w
-
-
-def _spd_factor(A):
-    return qdldl.Solver(sp.triu(A, format="csc"), upper=True)
