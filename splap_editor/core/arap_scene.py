@@ -1,0 +1,33 @@
+"""What as-rigid-as-possible deformation of a scene needs before any handle is placed."""
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+from splap_editor.core.arap_problem import edge_weights
+from splap_editor.core.splat_graph import SplatGraph
+
+
+class ArapScene:
+    """Shared by all handle sets of a scene; make it once.
+
+    Parameters
+    ----------
+    rest : (n, 3) float64
+        Rest positions of the nodes.
+    L : (n, n) scipy csr, float64
+        Laplacian, see `ArapDeformer`.
+    graph : SplatGraph
+        The splat graph of the same nodes.
+    """
+
+    def __init__(self, rest: NDArray[np.float64], L: sp.csr_matrix, graph: SplatGraph) -> None:
+        rest = np.ascontiguousarray(rest, np.float64)
+        if rest.ndim != 2 or rest.shape[1] != 3 or L.shape != (len(rest), len(rest)):
+            raise ValueError(f"rest and L must have shapes (n, 3) and (n, n), got {rest.shape} and {L.shape}")
+        self.rest: NDArray[np.float64] = rest
+        self.graph = graph
+        self.W: sp.csr_matrix = edge_weights(L)
+        _, component = connected_components(self.W, directed=False)
+        self.component: NDArray[np.int32] = component.astype(np.int32)
