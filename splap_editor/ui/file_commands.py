@@ -1,0 +1,201 @@
+"""Opening, exporting, saving, and never losing an edit by it."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from PySide6.QtCore import QSettings, QStandardPaths, Qt, QUrl
+from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import QFileDialog, QMessageBox, QWidget
+
+from splap_editor.resources import resource
+from splap_editor.session.export_report import ExportReport
+from splap_editor.session.session import Session
+from splap_editor.ui.export_dialog import ExportDialog
+from splap_editor.ui.toast import Toast
+
+PLY_FILTER = "Splat PLY (*.ply);;All files (*)"
+EDIT_FILTER = "Edit (*.json);;All files (*)"
+SAMPLE = "windmill_2dgs.ply"
+
+
+class FileCommands:
+    """Everything that reads or writes a file.
+
+    Parameters
+    ----------
+    window : QWidget
+        Parent of the dialogs.
+    session : Session
+    toast : Toast
+        Where results and refusals are said.
+    """
+
+    def __init__(self, window: QWidget, session: Session, toast: Toast) -> None:
+        self._window = window
+        self._session = session
+        self._toast = toast
+        self._after_export: Callable[[], None] | None = None
+        session.exported.connect(self._on_exported)
+        session.failed.connect(self._on_failed)
+
+    # ---------------------------------------------------------------- open
+
+    def open(self) -> None:
+        """Ask for a PLY and open it."""
+        self._ask_to_read("Open a splat PLY", PLY_FILTER, self.open_path)
+
+    def open_sample(self) -> None:
+        """Open the bundled sample."""
+        self.open_path(sample_path())
+
+    def open_path(self, path: Path) -> None:
+        """Open a PLY or an edit, after asking about an edit that would be lost."""
+        if path.suffix.lower() == ".json":
+            self._read_edit(path)
+            return
+        self.leave_edit(lambda: self._session.open(path))
+
+    def open_edit(self) -> None:
+        """Ask for a recipe and make it the edit."""
+        self._ask_to_read("Open an edit", EDIT_FILTER, self._read_edit)
+
+    def _read_edit(self, path: Path) -> None:
+        try:
+            self._session.open_edit(path)
+        except (OSError, ValueError, RuntimeError) as error:
+            self._toast.fail(f"{path.name} was not opened: {sentence(error)}")
+        else:
+            self._toast.say(f"Opened the edit {path.name}.")
+
+    # ---------------------------------------------------------------- write
+
+    def export(self) -> None:
+        """Ask where to, and write what is on screen."""
+        scene = self._session.scene
+        suggested = _folder_of(scene.file.path) / f"{scene.file.path.stem}_edited.ply"
+        dialog = ExportDialog(self._window, suggested, scene)
+        dialog.accepted.connect(lambda: self._export(dialog))
+        dialog.rejected.connect(self._forget_after_export)
+        dialog.open()
+
+    def _export(self, dialog: ExportDialog) -> None:
+        QSettings().setValue("files/folder", str(dialog.path.parent))
+        self._session.export(dialog.path, as_3dgs=dialog.as_3dgs)
+
+    def save_edit(self) -> None:
+        """Ask where to, and write the edit as a recipe."""
+        source = self._session.scene.file.path
+        dialog = QFileDialog(self._window, "Save the edit", str(_folder_of(source) / f"{source.stem}_edit.json"))
+        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
+        dialog.setNameFilter(EDIT_FILTER)
+        dialog.setDefaultSuffix("json")
+        self._open_dialog(dialog, self._write_edit)
+
+    def _write_edit(self, path: Path) -> None:
+        try:
+            self._session.save_edit(path)
+        except (OSError, ValueError) as error:
+            self._toast.fail(f"The edit was not saved: {sentence(error)}")
+        else:
+            self._toast.say(f"Saved the edit as {path.name}.")
+
+    def picture(self) -> None:
+        """Ask for a size, and write the view as a PNG."""
+        self._window.show_picture_dialog()
+
+    def quit(self) -> None:
+        """Close the window."""
+        self._window.close()
+
+    # ---------------------------------------------------------------- losing nothing
+
+    def leave_edit(self, then: Callable[[], None]) -> None:
+        """Go on at once, or after the person has exported or let go of an edit that was not exported."""
+        if not self._session.has_unexported_edit:
+            then()
+            return
+        scene = self._session.scene
+        box = QMessageBox(
+            QMessageBox.Icon.NoIcon,
+            "Export the edit?",
+            f"The edit of {scene.file.path.name} has not been exported.",
+            parent=self._window,
+        )
+        box.setInformativeText("It is lost when another file is opened or the window is closed.")
+        box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        export = box.addButton("Export…", QMessageBox.ButtonRole.AcceptRole)
+        discard = box.addButton("Discard", QMessageBox.ButtonRole.DestructiveRole)
+        box.addButton("Cancel", QMessageBox.ButtonRole.RejectRole)
+        box.setDefaultButton(export)
+
+        def answered(button: object) -> None:
+            if button is export:
+                self._after_export = then
+                self.export()
+            elif button is discard:
+                then()
+
+        box.buttonClicked.connect(answered)
+        box.open()
+
+    def _forget_after_export(self) -> None:
+        self._after_export = None
+
+    # ---------------------------------------------------------------- results
+
+    def _on_exported(self, report: ExportReport) -> None:
+        folder = QUrl.fromLocalFile(str(report.path.parent))
+        self._toast.say(f"Exported {report}.", Show_folder=lambda: QDesktopServices.openUrl(folder))
+        if self._after_export is not None:
+            then, self._after_export = self._after_export, None
+            then()
+
+    def _on_failed(self, title: str, error: Exception) -> None:
+        self._after_export = None
+        self._toast.fail(f"{title} failed: {sentence(error)}")
+
+    # ---------------------------------------------------------------- dialogs
+
+    def _ask_to_read(self, title: str, name_filter: str, take: Callable[[Path], None]) -> None:
+        folder = QSettings().value("files/folder", _documents(), type=str)
+        dialog = QFileDialog(self._window, title, folder)
+        dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
+        dialog.setNameFilter(name_filter)
+        self._open_dialog(dialog, take)
+
+    def _open_dialog(self, dialog: QFileDialog, take: Callable[[Path], None]) -> None:
+        def chosen(name: str) -> None:
+            QSettings().setValue("files/folder", str(Path(name).parent))
+            take(Path(name))
+
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.fileSelected.connect(chosen)
+        dialog.open()
+
+
+def sample_path() -> Path:
+    """The capture that the program opens with."""
+    return resource("samples", SAMPLE)
+
+
+def sentence(error: BaseException) -> str:
+    """What went wrong, for a person."""
+    if isinstance(error, MemoryError):
+        return "there is not enough memory; close other programs or use a smaller file."
+    if isinstance(error, OSError) and error.strerror:
+        name = f" ({Path(error.filename).name})" if error.filename else ""
+        return f"{error.strerror.lower()}{name}."
+    text = str(error) or type(error).__name__
+    return text if text.endswith((".", "!", "?")) else f"{text}."
+
+
+def _documents() -> str:
+    return QStandardPaths.writableLocation(QStandardPaths.StandardLocation.DocumentsLocation)
+
+
+def _folder_of(source: Path) -> Path:
+    """Folder to write to: the one used last, else the source's unless it is one of the program's own."""
+    used = QSettings().value("files/folder", "", type=str)
+    if used and Path(used).is_dir():
+        return Path(used)
+    return Path(_documents()) if source.parent == sample_path().parent else source.parent

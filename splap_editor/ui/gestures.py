@@ -1,0 +1,32 @@
+"""What the mouse, the trackpad and single keys do: the second half of the help sheet."""
+
+GESTURES: dict[str, tuple[tuple[str, str], ...]] = {
+    "Look around": (
+        ("Middle drag", "Orbit"),
+        ("Left drag on empty space", "Orbit"),
+        ("Shift + middle drag", "Pan"),
+        ("Ctrl + middle drag, wheel", "Zoom to the pointer"),
+        ("Two fingers", "Orbit; with Shift pan"),
+        ("Pinch", "Zoom"),
+    ),
+    "Handles": (
+        ("Click", "Place a handle, or choose one"),
+        ("Drag arrow, square, dot", "Move along an axis, in a plane, on the screen"),
+        ("Drag ring, box", "Turn, scale"),
+        ("G, R, S", "Move, turn, scale with the pointer"),
+        ("… then X, Y, Z", "Lock to an axis; with Shift to a plane"),
+        ("… then a number", "By exactly so much"),
+        ("Ctrl, Shift", "Snap, fine"),
+        ("Return or click, Esc", "Take it, drop it"),
+        ("Ctrl + wheel, [ ]", "Reach of the next handle"),
+    ),
+    "Select": (
+        ("Click, drag", "Splats under the pointer, in the frame, lasso or brush"),
+        ("Shift", "Add"),
+        ("Ctrl", "Remove"),
+        ("Shift + Ctrl", "Keep only what is in both"),
+        ("Wheel with the brush", "Size of the brush"),
+    ),
+    "Look": (("Hold O", "Show the original"),),
+    "Numbers": (("Drag a label sideways", "Change the number"),),
+}

@@ -1,0 +1,132 @@
+"""Numbers of a handle's pose: translation, Euler angles, scale."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QWidget
+
+from splap_editor.core.rotations import matrices_to_quats, quats_to_matrices
+from splap_editor.session.edit import Pose
+from splap_editor.ui.number_field import NumberField, ScrubLabel
+from splap_editor.ui.theme import STEP
+
+AXIS_COLORS = ("#f2746b", "#8fcf5f", "#6ea8ff")
+
+
+def euler_degrees(quat: ArrayLike) -> NDArray[np.float64]:
+    """Angles (x, y, z) in degrees of ``R = Rz Ry Rx`` for a unit quaternion w x y z; at the pole z is 0."""
+    R = quats_to_matrices(np.asarray(quat, np.float64)[None])[0]
+    y = np.arcsin(np.clip(-R[2, 0], -1.0, 1.0))
+    if abs(R[2, 0]) < 1.0 - 1e-9:
+        x, z = np.arctan2(R[2, 1], R[2, 2]), np.arctan2(R[1, 0], R[0, 0])
+    else:
+        x, z = np.arctan2(-R[1, 2], R[1, 1]), 0.0
+    return np.degrees([x, y, z])
+
+
+def quat_of_euler(degrees: ArrayLike) -> tuple[float, float, float, float]:
+    """Unit quaternion w x y z of ``R = Rz Ry Rx``, angles in degrees."""
+    (cx, cy, cz), (sx, sy, sz) = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    R = np.array(
+        [
+            [cy * cz, sx * sy * cz - cx * sz, cx * sy * cz + sx * sz],
+            [cy * sz, sx * sy * sz + cx * cz, cx * sy * sz - sx * cz],
+            [-sy, sx * cy, cx * cy],
+        ]
+    )
+    return tuple(float(number) for number in matrices_to_quats(R[None])[0])
+
+
+class PoseForm(QWidget):
+    """Edits one `Pose`.
+
+    `changed` gives a pose to make an undoable step of; `previewed` one that
+    follows the pointer until `changed` or `cancelled` comes.
+    """
+
+    changed = Signal(object)
+    previewed = Signal(object)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._pose = Pose()
+        self._euler = np.zeros(3)
+        self._scrubbed: Pose | None = None
+        grid = QGridLayout(self)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setHorizontalSpacing(STEP)
+        grid.setVerticalSpacing(STEP)
+        self.translate = [NumberField(-1e9, 1e9, decimals=4, step=0.01) for _ in range(3)]
+        self.rotate = [NumberField(-360, 360, decimals=2, step=1, unit="°") for _ in range(3)]
+        self.scale = NumberField(0.01, 100, decimals=3, step=0.01)
+        for axis, (name, color) in enumerate(zip("XYZ", AXIS_COLORS, strict=True)):
+            head = QLabel(f'<span style="color:{color}">{name}</span>')
+            grid.addWidget(head, 0, axis + 1)
+            grid.setColumnStretch(axis + 1, 1)
+            grid.addLayout(self._cell(self.translate[axis], color), 1, axis + 1)
+            grid.addLayout(self._cell(self.rotate[axis], color), 2, axis + 1)
+        for row, (text, fields) in enumerate(
+            (("Move", self.translate), ("Rotate", self.rotate), ("Scale", [self.scale]))
+        ):
+            label = ScrubLabel(text, fields[0]) if len(fields) == 1 else QLabel(text)
+            label.setProperty("tone", "quiet")
+            grid.addWidget(label, row + 1, 0)
+            if isinstance(label, ScrubLabel):
+                self._connect_scrub(label, fields[0])
+        grid.addWidget(self.scale, 3, 1)
+        for field in (*self.translate, *self.rotate, self.scale):
+            field.committed.connect(lambda _: self.changed.emit(self._read()))
+
+    def show_pose(self, pose: Pose, unit: float) -> None:
+        """Show a pose; ``unit`` is a typical length, from which the steps follow."""
+        # Angles as typed are kept while they mean the same rotation: 180° stays 180°.
+        if not np.allclose(quat_of_euler(self._euler), pose.rotate, atol=1e-9):
+            self._euler = euler_degrees(pose.rotate)
+        self._pose = pose
+        step = 10.0 ** np.floor(np.log10(max(unit, 1e-9) * 0.01))
+        for axis in range(3):
+            self.translate[axis].setSingleStep(step)
+            self.translate[axis].show_value(pose.translate[axis])
+            self.rotate[axis].show_value(self._euler[axis])
+        self.scale.show_value(pose.scale)
+
+    def _cell(self, field: NumberField, color: str) -> QHBoxLayout:
+        grip = ScrubLabel("‖", field)
+        grip.setFixedWidth(8)
+        grip.setStyleSheet(f"color: {color};")
+        self._connect_scrub(grip, field)
+        cell = QHBoxLayout()
+        cell.setSpacing(0)
+        cell.addWidget(grip)
+        cell.addWidget(field, 1)
+        return cell
+
+    def _connect_scrub(self, grip: ScrubLabel, field: NumberField) -> None:
+        def moved(value: float) -> None:
+            field.show_value(value)
+            self._scrubbed = self._read()
+            self.previewed.emit(self._scrubbed)
+
+        def finished() -> None:
+            if self._scrubbed is not None:
+                pose, self._scrubbed = self._scrubbed, None
+                self.changed.emit(pose)
+
+        grip.moved.connect(moved)
+        grip.finished.connect(finished)
+
+    def _read(self) -> Pose:
+        angles = np.array([field.value() for field in self.rotate])
+        shown = np.round(self._euler, self.rotate[0].decimals())
+        rotate = self._pose.rotate
+        if not np.array_equal(angles, shown):
+            self._euler = np.where(angles == shown, self._euler, angles)
+            rotate = quat_of_euler(self._euler)
+        translate = tuple(
+            held if field.value() == round(held, field.decimals()) else field.value()
+            for field, held in zip(self.translate, self._pose.translate, strict=True)
+        )
+        scale = self.scale.value()
+        if scale == round(self._pose.scale, self.scale.decimals()):
+            scale = self._pose.scale
+        return Pose(translate, rotate, scale)

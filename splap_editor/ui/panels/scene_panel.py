@@ -1,0 +1,83 @@
+"""What is open: the file, what wrote it, and what is odd about it."""
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QGridLayout, QLabel, QVBoxLayout, QWidget
+
+from splap_editor.session.scene import Scene
+from splap_editor.session.scene_info import flatness, graph_info
+from splap_editor.session.session import Session
+from splap_editor.ui.options_form import form_label
+from splap_editor.ui.theme import STEP
+
+ROWS = {
+    "file": "File",
+    "layout": "Layout",
+    "splats": "Splats",
+    "colour": "Colour",
+    "size": "Size",
+    "surface": "Surface",
+}
+
+
+class ScenePanel(QWidget):
+    """Facts about the open file; the surface's are added once it is prepared."""
+
+    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._session = session
+        self._scene: Scene | None = None
+        grid = QGridLayout()
+        grid.setHorizontalSpacing(3 * STEP)
+        grid.setVerticalSpacing(STEP)
+        grid.setColumnStretch(1, 1)
+        self.facts: dict[str, QLabel] = {}
+        for row, (name, text) in enumerate(ROWS.items()):
+            value = QLabel(wordWrap=True, textInteractionFlags=Qt.TextInteractionFlag.TextSelectableByMouse)
+            label = form_label(text, value)
+            label.setAlignment(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft)
+            grid.addWidget(label, row, 0)
+            grid.addWidget(value, row, 1)
+            self.facts[name] = value
+        self.warnings = QLabel(wordWrap=True)
+        self.warnings.setProperty("tone", "warning")
+        layout = QVBoxLayout(self)
+        layout.setSpacing(2 * STEP)
+        layout.addLayout(grid)
+        layout.addWidget(self.warnings)
+        session.scene_changed.connect(self._on_scene_changed)
+        self._on_scene_changed()
+
+    def _on_scene_changed(self) -> None:
+        self._scene = scene = self._session.scene
+        self.setEnabled(scene is not None)
+        self.warnings.setVisible(False)
+        if scene is None:
+            for value in self.facts.values():
+                value.setText("–")
+            return
+        scene.surface_changed.connect(self._show_surface)
+        splats, file = scene.splats, scene.file
+        n_inert = splats.n_splats - scene.ellipses.n_nodes
+        self.facts["file"].setText(file.path.name)
+        self.facts["file"].setToolTip(str(file.path))
+        self.facts["layout"].setText(f"{file.layout.name}: {file.layout.reason}")
+        inert = f", {n_inert:,} too faint or broken to shape the surface" if n_inert else ""
+        self.facts["splats"].setText(f"{splats.n_splats:,}{inert}")
+        degree = splats.sh_degree
+        self.facts["colour"].setText(f"view-dependent, degree {degree}" if degree else "the same from every side")
+        flat = flatness(splats)["p50"]
+        shape = "flat discs" if flat < 0.05 else "mostly flat" if flat < 0.3 else "thick: expect a rougher surface"
+        self.facts["size"].setText(f"{scene.ellipses.scene_scale:.4g} units; {shape}")
+        self.warnings.setText("\n".join(f"• {warning}" for warning in file.warnings))
+        self.warnings.setVisible(bool(file.warnings))
+        self._show_surface()
+
+    def _show_surface(self) -> None:
+        surface = self._scene.surface
+        if surface is None:
+            self.facts["surface"].setText("not prepared yet")
+            return
+        info = graph_info(surface.graph)
+        n = info["n_components"]
+        pieces = "in one piece" if n == 1 else f"in {n:,} pieces"
+        self.facts["surface"].setText(f"{info['n_edges']:,} connections, {pieces}")

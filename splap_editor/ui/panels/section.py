@@ -1,0 +1,49 @@
+"""A panel section that folds away."""
+
+from PySide6.QtCore import QSettings, QSize, Qt
+from PySide6.QtWidgets import QFrame, QSizePolicy, QToolButton, QVBoxLayout, QWidget
+
+from splap_editor.ui.theme import STEP, icon
+
+
+class Section(QFrame):
+    """A titled part of the dock; whether it is folded is remembered.
+
+    Parameters
+    ----------
+    title : str
+    body : QWidget
+        What folds away.
+    """
+
+    def __init__(self, title: str, body: QWidget, *, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("panelSection")
+        self._key = f"panels/{title.lower()}"
+        self.body = body
+        self.header = QToolButton(text=title, checkable=True)
+        self.header.setObjectName("sectionHeader")
+        self.header.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+        self.header.setIconSize(QSize(12, 12))
+        self.header.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.header.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(0)
+        layout.addWidget(self.header)
+        layout.addWidget(body)
+        body.setContentsMargins(0, 0, 0, 0)
+        if body.layout() is not None:
+            body.layout().setContentsMargins(3 * STEP, STEP, 3 * STEP, 3 * STEP)
+        is_open = QSettings().value(self._key, True, type=bool)
+        self.header.setChecked(is_open)
+        self._unfold(is_open)
+        self.header.toggled.connect(self._on_toggled)
+
+    def _on_toggled(self, is_open: bool) -> None:
+        self._unfold(is_open)
+        QSettings().setValue(self._key, is_open)
+
+    def _unfold(self, is_open: bool) -> None:
+        self.header.setIcon(icon("chevron-down" if is_open else "chevron-right"))
+        self.body.setVisible(is_open)

@@ -1,0 +1,231 @@
+"""The Qt widget around the viewport: one VTK render per shown frame, pointer and key events for the tools."""
+
+import os
+from collections.abc import Callable
+from math import log
+from time import perf_counter
+
+os.environ.setdefault("QT_API", "pyside6")
+
+from PySide6.QtCore import QEvent, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QMouseEvent, QNativeGestureEvent, QWheelEvent
+from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QLineEdit, QWidget
+from pyvistaqt import QtInteractor
+
+from splap_editor.tools.tool import KeyEvent, PointerEvent
+
+BUTTONS = {
+    Qt.MouseButton.LeftButton: "left",
+    Qt.MouseButton.MiddleButton: "middle",
+    Qt.MouseButton.RightButton: "right",
+}
+NOTCH = 120.0
+PINCH_NOTCH = log(1.15)
+COMPARE_KEY = "O"
+
+PointerTaker = Callable[[PointerEvent], bool]
+KeyTaker = Callable[[KeyEvent], bool]
+
+
+class ViewportWidget(QtInteractor):
+    """Shows a VTK render window and tells what pointer and keys do over it.
+
+    pyvistaqt renders twice for each frame shown and holds Python's lock
+    meanwhile. Here every render request only asks Qt for a paint; the paint
+    does the one render, by a call that lets other threads run. VTK's own
+    mouse and key bindings never see an event.
+    """
+
+    frame_drawn = Signal(float)
+    """A frame is on its way to the screen; the milliseconds its render took."""
+    resized = Signal()
+    compare_held = Signal(bool)
+    menu_wanted = Signal(object)
+    """A right click that no tool wanted; the global position."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        self._is_ready = False
+        super().__init__(parent, auto_update=False, multi_samples=0)
+        self._pointer_taker: PointerTaker = lambda event: False
+        self._key_taker: KeyTaker = lambda event: False
+        self._taken_key: int | None = None
+        self._is_compare_held = False
+        self.n_renders = 0
+        interactor = self.iren.interactor
+        interactor.EnableRenderOff()
+        self._render_tag = interactor.AddObserver("RenderEvent", self._on_render_event)
+        self.reset_key_events()
+        interactor.RemoveObservers("CharEvent")
+        self.setAcceptDrops(False)
+        self.setMinimumSize(320, 240)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setMouseTracking(True)
+        self._is_ready = True
+
+    def connect_tools(self, pointer: PointerTaker, key: KeyTaker) -> None:
+        """Say who takes pointer and key events; each returns True for an event it used."""
+        self._pointer_taker = pointer
+        self._key_taker = key
+
+    # ---------------------------------------------------------------- frames
+
+    def render(self, *_: object, **__: object) -> None:
+        """Ask for a frame; any number of requests give one."""
+        if self._is_ready:
+            self.update()
+
+    def paintGL(self) -> None:
+        """Draw one frame."""
+        start = perf_counter()
+        super().paintGL()
+        self.frame_drawn.emit(1000.0 * (perf_counter() - start))
+
+    def resizeGL(self, width: int, height: int) -> None:
+        """Follow the widget's size."""
+        super().resizeGL(width, height)
+        self.resized.emit()
+
+    def _on_render_event(self, *_: object) -> None:
+        if self._in_paint:
+            self.n_renders += 1
+            # vtkRenderWindow.Render lets other threads run; vtkRenderWindowInteractor.Render does not.
+            self._RenderWindow.Render()
+        else:
+            self.update()
+
+    def close(self) -> None:
+        """Free the GL objects; the widget shows nothing afterwards."""
+        if self._is_ready:
+            self._is_ready = False
+            self.iren.interactor.RemoveObserver(self._render_tag)
+        super().close()
+
+    # ---------------------------------------------------------------- pointer
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Pass a press; one with the right button that nobody wants asks for the menu."""
+        self.setFocus(Qt.FocusReason.MouseFocusReason)
+        if not self._pass("press", event) and event.button() == Qt.MouseButton.RightButton:
+            self.menu_wanted.emit(event.globalPosition().toPoint())
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        """Pass a release."""
+        self._pass("release", event)
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        """Pass a double click, and as a press where nobody wants it as such."""
+        if not self._pass("double", event):
+            self.mousePressEvent(event)
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Pass a move."""
+        self._pass("move", event)
+
+    def enterEvent(self, event: QEvent) -> None:
+        """Take the keyboard, unless something is being typed."""
+        if not isinstance(QApplication.focusWidget(), (QLineEdit, QAbstractSpinBox)):
+            self.setFocus(Qt.FocusReason.MouseFocusReason)
+
+    def leaveEvent(self, event: QEvent) -> None:
+        """Tell that the pointer is gone."""
+        self._pointer_taker(PointerEvent("leave", (-1.0, -1.0)))
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Pass a wheel turn, or the move of two fingers on a trackpad."""
+        ratio = self.devicePixelRatioF()
+        pixels, angle = event.pixelDelta(), event.angleDelta()
+        is_trackpad = not pixels.isNull() and event.phase() != Qt.ScrollPhase.NoScrollPhase
+        # Alt turns the wheel sideways on some platforms.
+        notches = (angle.y() or angle.x()) / NOTCH
+        pan = (pixels.x() * ratio, pixels.y() * ratio) if is_trackpad else (0.0, 0.0)
+        self._pass("wheel", event, steps=notches, pan_px=pan)
+        event.accept()
+
+    def event(self, event: QEvent) -> bool:
+        """Let tools have a key before the shortcuts do, and a pinch before Qt does."""
+        kind = event.type()
+        if kind == QEvent.Type.ShortcutOverride:
+            if self._offer_key(event, pressed=True):
+                self._taken_key = event.key()
+                event.accept()
+                return True
+        elif kind == QEvent.Type.NativeGesture:
+            return self._on_native_gesture(event)
+        return super().event(event)
+
+    def _on_native_gesture(self, event: QNativeGestureEvent) -> bool:
+        if event.gestureType() != Qt.NativeGestureType.ZoomNativeGesture:
+            return False
+        steps = log(max(1.0 + event.value(), 0.05)) / PINCH_NOTCH
+        return self._pass("wheel", event, steps=steps)
+
+    def _pass(self, kind: str, event: QMouseEvent, **more: object) -> bool:
+        ratio = self.devicePixelRatioF()
+        held = event.modifiers()
+        position = event.position()
+        buttons = event.buttons() if hasattr(event, "buttons") else Qt.MouseButton.NoButton
+        button = BUTTONS.get(event.button(), "") if kind in ("press", "release", "double") else ""
+        return self._pointer_taker(
+            PointerEvent(
+                kind,
+                (position.x() * ratio, position.y() * ratio),
+                button,
+                frozenset(name for flag, name in BUTTONS.items() if buttons & flag),
+                shift=bool(held & Qt.KeyboardModifier.ShiftModifier),
+                ctrl=bool(held & Qt.KeyboardModifier.ControlModifier),
+                alt=bool(held & Qt.KeyboardModifier.AltModifier),
+                **more,
+            )
+        )
+
+    # ---------------------------------------------------------------- keys
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Pass a key that no shortcut took; the one already taken while shortcuts were asked is not passed twice."""
+        if self._taken_key == event.key():
+            self._taken_key = None
+            return
+        key = _key_name(event)
+        if key == COMPARE_KEY and not event.modifiers():
+            if not event.isAutoRepeat():
+                self._hold_compare(True)
+        elif not self._offer_key(event, pressed=True):
+            event.ignore()
+
+    def keyReleaseEvent(self, event: QKeyEvent) -> None:
+        """Pass a key let go."""
+        if event.isAutoRepeat():
+            return
+        if _key_name(event) == COMPARE_KEY:
+            self._hold_compare(False)
+        self._offer_key(event, pressed=False)
+
+    def focusOutEvent(self, event: QEvent) -> None:
+        """Let go of held keys: their release goes elsewhere."""
+        self._hold_compare(False)
+        super().focusOutEvent(event)
+
+    def _hold_compare(self, is_held: bool) -> None:
+        if is_held != self._is_compare_held:
+            self._is_compare_held = is_held
+            self.compare_held.emit(is_held)
+
+    def _offer_key(self, event: QKeyEvent, *, pressed: bool) -> bool:
+        held = event.modifiers()
+        return self._key_taker(
+            KeyEvent(
+                _key_name(event),
+                event.text(),
+                shift=bool(held & Qt.KeyboardModifier.ShiftModifier),
+                ctrl=bool(held & Qt.KeyboardModifier.ControlModifier),
+                alt=bool(held & Qt.KeyboardModifier.AltModifier),
+                pressed=pressed,
+            )
+        )
+
+
+def _key_name(event: QKeyEvent) -> str:
+    try:
+        return Qt.Key(event.key()).name.removeprefix("Key_")
+    except ValueError:
+        return ""
