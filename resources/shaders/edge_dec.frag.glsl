@@ -1,0 +1,1 @@
+in float edgeDepth;

@@ -1,0 +1,250 @@
+"""Which splats lie in a region of the screen."""
+
+import numba as nb
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from splap_editor.viewport.projection import Projection
+from splap_editor.viewport.splat_actor import DisplayMode, SplatActor, SplatFlag
+
+_HIDDEN = int(SplatFlag.HIDDEN)
+# What blocks the view in a blended picture: the inner part of splats that are not mere haze.
+_SOLID_RADIUS = 1.0
+_SOLID_OPACITY = 0.1
+_CELL_PX = 2
+
+
+@nb.njit(nogil=True, cache=True)
+def _project(means, colors, flags, cut, clip, width, height, screen):
+    for i in range(means.shape[0]):
+        x, y, z = means[i, 0], means[i, 1], means[i, 2]
+        w = clip[3, 0] * x + clip[3, 1] * y + clip[3, 2] * z + clip[3, 3]
+        depth = clip[2, 0] * x + clip[2, 1] * y + clip[2, 2] * z + clip[2, 3]
+        if flags[i] & _HIDDEN or colors[i, 3] < cut or w <= 0.0 or depth <= 0.0:
+            screen[i, 0] = screen[i, 1] = screen[i, 2] = np.nan
+            continue
+        screen[i, 0] = ((clip[0, 0] * x + clip[0, 1] * y + clip[0, 2] * z + clip[0, 3]) / w + 1.0) * 0.5 * width
+        screen[i, 1] = (1.0 - (clip[1, 0] * x + clip[1, 1] * y + clip[1, 2] * z + clip[1, 3]) / w) * 0.5 * height
+        screen[i, 2] = depth
+
+
+def _local_matrices(actor: SplatActor, projection: Projection) -> NDArray[np.float32]:
+    """Rows x, y and w of clip coordinates, and depth along the view as row z, from the actor's own coordinates."""
+    clip = projection.clip_from_world.copy()
+    clip[2, :3] = projection.direction
+    clip[2, 3] = -projection.direction @ projection.eye
+    clip[:, 3] += clip[:, :3] @ actor.origin
+    return clip.astype(np.float32)
+
+
+def screen_points(actor: SplatActor, projection: Projection) -> NDArray[np.float32]:
+    """Where the centres are on the screen, for the regions below.
+
+    Returns
+    -------
+    (N, 3) float32
+        Device pixels x, y from the top left and the depth in front of the
+        eye in world units; NaN for splats that are hidden, under the opacity
+        cut or behind the eye, so that no region contains them.
+    """
+    screen = np.empty((actor.n_splats, 3), np.float32)
+    size = np.float32(projection.width), np.float32(projection.height)
+    _project(actor.means, actor.colors, actor.flags, actor.cut_byte, _local_matrices(actor, projection), *size, screen)
+    return screen
+
+
+@nb.njit(nogil=True, cache=True)
+def _in_box(screen, x0, y0, x1, y1, inside):
+    for i in range(screen.shape[0]):
+        inside[i] = x0 <= screen[i, 0] <= x1 and y0 <= screen[i, 1] <= y1
+
+
+def in_rectangle(screen: NDArray[np.float32], x0: float, y0: float, x1: float, y1: float) -> NDArray[np.bool_]:
+    """(N,) whether each of the `screen_points` lies in a rectangle given by two opposite corners."""
+    inside = np.empty(len(screen), bool)
+    xs, ys = sorted((float(x0), float(x1))), sorted((float(y0), float(y1)))
+    _in_box(screen, xs[0], ys[0], xs[1], ys[1], inside)
+    return inside
+
+
+@nb.njit(nogil=True, cache=True)
+def _fill_polygon(polygon, mask):
+    """Even-odd scanlines through the centres of pixel rows."""
+    n = polygon.shape[0]
+    crossings = np.empty(n, np.float64)
+    for row in range(mask.shape[0]):
+        y = row + 0.5
+        count = 0
+        for i in range(n):
+            ax, ay = polygon[i]
+            bx, by = polygon[(i + 1) % n]
+            if (ay <= y) != (by <= y):
+                crossings[count] = ax + (y - ay) / (by - ay) * (bx - ax)
+                count += 1
+        ordered = np.sort(crossings[:count])
+        for k in range(0, count - 1, 2):
+            first = max(int(np.ceil(ordered[k] - 0.5)), 0)
+            last = min(int(np.ceil(ordered[k + 1] - 0.5)), mask.shape[1])
+            for column in range(first, last):
+                mask[row, column] = 1
+
+
+@nb.njit(nogil=True, cache=True)
+def _in_mask(screen, mask, left, top, inside):
+    height, width = mask.shape
+    for i in range(screen.shape[0]):
+        x, y = screen[i, 0] - left, screen[i, 1] - top
+        inside[i] = 0.0 <= x < width and 0.0 <= y < height and mask[int(y), int(x)] == 1
+
+
+def in_lasso(screen: NDArray[np.float32], polygon: ArrayLike) -> NDArray[np.bool_]:
+    """(N,) whether each of the `screen_points` lies in a closed polygon (K, 2) of pixels, even-odd, to one pixel."""
+    polygon = np.ascontiguousarray(polygon, np.float64)
+    if polygon.ndim != 2 or polygon.shape[1] != 2:
+        raise ValueError(f"polygon must have shape (K, 2), got {polygon.shape}")
+    inside = np.zeros(len(screen), bool)
+    if len(polygon) >= 3:
+        low = np.floor(polygon.min(axis=0))
+        width, height = (np.ceil(polygon.max(axis=0)) - low + 1).astype(int)
+        mask = np.zeros((height, width), np.uint8)
+        _fill_polygon(polygon - low, mask)
+        _in_mask(screen, mask, np.float32(low[0]), np.float32(low[1]), inside)
+    return inside
+
+
+@nb.njit(nogil=True, cache=True)
+def _near_path(screen, path, radius, inside):
+    low_x, high_x = path[:, 0].min() - radius, path[:, 0].max() + radius
+    low_y, high_y = path[:, 1].min() - radius, path[:, 1].max() + radius
+    for i in range(screen.shape[0]):
+        x, y = screen[i, 0], screen[i, 1]
+        inside[i] = False
+        if not (low_x <= x <= high_x and low_y <= y <= high_y):
+            continue
+        for k in range(path.shape[0]):
+            ax, ay = path[max(k - 1, 0)]
+            bx, by = path[k]
+            ex, ey = bx - ax, by - ay
+            length = ex * ex + ey * ey
+            t = min(max(((x - ax) * ex + (y - ay) * ey) / length, 0.0), 1.0) if length > 0.0 else 0.0
+            if (x - ax - t * ex) ** 2 + (y - ay - t * ey) ** 2 <= radius * radius:
+                inside[i] = True
+                break
+
+
+def in_brush(screen: NDArray[np.float32], path: ArrayLike, radius_px: float) -> NDArray[np.bool_]:
+    """(N,) whether each of the `screen_points` lies within a radius of a stroke, a polyline (K, 2) of pixels, K >= 1."""
+    path = np.ascontiguousarray(np.atleast_2d(path), np.float64)
+    if path.ndim != 2 or path.shape[1] != 2 or not len(path):
+        raise ValueError(f"path must have shape (K, 2) with K >= 1, got {path.shape}")
+    inside = np.empty(len(screen), bool)
+    _near_path(screen, path, float(radius_px), inside)
+    return inside
+
+
+@nb.njit(nogil=True, cache=True)
+def _depth_grid(screen, axes_u, axes_v, shape, colors, clip, size, scale, solid_radius, solid_cut, left, top, grid):
+    """Nearest depth of each cell over the ellipses that cover its centre, each ellipse projected affinely."""
+    rows, columns = grid.shape
+    is_perspective = clip[3, 0] != 0.0 or clip[3, 1] != 0.0 or clip[3, 2] != 0.0
+    half = np.array([0.5 * size[0], -0.5 * size[1]], np.float32)
+    local = np.empty((2, 3), np.float32)
+    for i in range(screen.shape[0]):
+        reach = min(shape[i, 1] * scale, solid_radius)
+        depth = screen[i, 2]
+        if not depth > 0.0 or reach <= 0.0 or colors[i, 3] < solid_cut:
+            continue
+        # In perspective w is the depth itself; an orthographic camera has w = 1 everywhere.
+        w = depth if is_perspective else np.float32(1.0)
+        px, py = screen[i, 0], screen[i, 1]
+        nx, ny = px / half[0] - 1.0, py / half[1] + 1.0
+        for k in range(2):
+            axis = axes_u[i] if k == 0 else axes_v[i]
+            dw = clip[3, 0] * axis[0] + clip[3, 1] * axis[1] + clip[3, 2] * axis[2]
+            local[k, 0] = half[0] / w * (clip[0, 0] * axis[0] + clip[0, 1] * axis[1] + clip[0, 2] * axis[2] - nx * dw)
+            local[k, 1] = half[1] / w * (clip[1, 0] * axis[0] + clip[1, 1] * axis[1] + clip[1, 2] * axis[2] - ny * dw)
+            local[k, 2] = clip[2, 0] * axis[0] + clip[2, 1] * axis[1] + clip[2, 2] * axis[2]
+        ax, ay, bx, by = local[0, 0], local[0, 1], local[1, 0], local[1, 1]
+        det = ax * by - ay * bx
+        if abs(det) < 1e-9:
+            continue
+        hx, hy = reach * np.sqrt(ax * ax + bx * bx), reach * np.sqrt(ay * ay + by * by)
+        c0, c1 = max(int((px - hx - left) / _CELL_PX), 0), min(int((px + hx - left) / _CELL_PX) + 1, columns)
+        r0, r1 = max(int((py - hy - top) / _CELL_PX), 0), min(int((py + hy - top) / _CELL_PX) + 1, rows)
+        for r in range(r0, r1):
+            y = (r + 0.5) * _CELL_PX + top - py
+            for c in range(c0, c1):
+                x = (c + 0.5) * _CELL_PX + left - px
+                a, b = (by * x - bx * y) / det, (ax * y - ay * x) / det
+                if a * a + b * b <= reach * reach:
+                    z = depth + a * local[0, 2] + b * local[1, 2]
+                    if 0.0 < z < grid[r, c]:
+                        grid[r, c] = z
+
+
+@nb.njit(nogil=True, cache=True)
+def _keep_nearest(screen, grid, slack, left, top, inside):
+    for i in range(screen.shape[0]):
+        if inside[i]:
+            c, r = int((screen[i, 0] - left) / _CELL_PX), int((screen[i, 1] - top) / _CELL_PX)
+            if 0 <= r < grid.shape[0] and 0 <= c < grid.shape[1]:
+                inside[i] = screen[i, 2] <= grid[r, c] + slack
+
+
+def visible_only(
+    actor: SplatActor,
+    projection: Projection,
+    screen: NDArray[np.float32],
+    inside: NDArray[np.bool_],
+    *,
+    slack: float = 0.015,
+) -> NDArray[np.bool_]:
+    """Those splats of a region that nothing else hides.
+
+    The ellipses are drawn into a coarse depth grid over the region, so the
+    answer does not hang on a frame having been shown. In a blended picture
+    only the inner standard deviation of splats above 0.1 opacity hides what
+    is behind.
+
+    Parameters
+    ----------
+    actor, projection
+        What is drawn, and the camera.
+    screen : (N, 3) float32
+        `screen_points` of the two.
+    inside : (N,) bool
+        The region.
+    slack : float
+        How far behind the nearest surface still counts as on it, as a share
+        of the actor's extent; layers of one surface lie that far apart.
+
+    Returns
+    -------
+    (N,) bool
+        A subset of ``inside``, a new array.
+    """
+    visible = inside.copy()
+    if not inside.any():
+        return visible
+    low = np.clip(np.floor(screen[inside, :2].min(axis=0)), 0, None)
+    high = np.minimum(np.ceil(screen[inside, :2].max(axis=0)) + 1, [projection.width, projection.height])
+    columns, rows = np.maximum((high - low) / _CELL_PX + 1, 1).astype(int)
+    grid = np.full((rows, columns), np.inf, np.float32)
+    is_ellipses = actor.look.mode is DisplayMode.ELLIPSES
+    _depth_grid(
+        screen,
+        actor.axes_u,
+        actor.axes_v,
+        actor.shape,
+        actor.colors,
+        _local_matrices(actor, projection),
+        np.array([projection.width, projection.height], np.float32),
+        np.float32(actor.look.size_factor if is_ellipses else 1.0),
+        np.float32(np.inf if is_ellipses else _SOLID_RADIUS),
+        actor.cut_byte if is_ellipses else int(_SOLID_OPACITY * 255),
+        np.float32(low[0]),
+        np.float32(low[1]),
+        grid,
+    )
+    _keep_nearest(screen, grid, np.float32(slack * actor.extent), np.float32(low[0]), np.float32(low[1]), visible)
+    return visible
