@@ -17,7 +17,7 @@ HANDLE_COLORS = ("#f2a93b", "#4fb3ff", "#7bd66b", "#e66fb0", "#b18cff", "#ff7a59
 
 @dataclass(frozen=True)
 class Pose:
-    """A similarity about a centre: ``x → center + translate + scale · R (x - center)``.
+    """A pose about a centre: ``x → center + translate + R (scale · (x - center))``.
 
     Parameters
     ----------
@@ -25,13 +25,17 @@ class Pose:
         World units.
     rotate : 4 floats
         Unit quaternion, w x y z.
-    scale : float
-        Uniform, greater than 0.
+    scale : float or 3 floats
+        Uniform, or along the world axes before the rotation; greater than 0.
     """
 
     translate: tuple[float, float, float] = (0.0, 0.0, 0.0)
     rotate: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
-    scale: float = 1.0
+    scale: float | tuple[float, float, float] = 1.0
+
+    def __post_init__(self) -> None:
+        if isinstance(self.scale, (list, tuple)):
+            object.__setattr__(self, "scale", tuple(self.scale))
 
     @property
     def is_identity(self) -> bool:
@@ -41,7 +45,7 @@ class Pose:
     def matrix(self, center: NDArray[np.float64]) -> NDArray[np.float64]:
         """(4, 4) world transform of the pose about ``center``."""
         transform = np.eye(4)
-        transform[:3, :3] = self.scale * quats_to_matrices(np.array([self.rotate]))[0]
+        transform[:3, :3] = quats_to_matrices(np.array([self.rotate]))[0] * np.asarray(self.scale)
         transform[:3, 3] = center + np.array(self.translate) - transform[:3, :3] @ center
         return transform
 
@@ -59,7 +63,7 @@ class Pose:
         turn = delta[:3, :3] / scale @ quats_to_matrices(np.array([self.rotate]))[0]
         at = delta[:3, :3] @ (center + np.array(self.translate)) + delta[:3, 3] - center
         quat = matrices_to_quats(turn[None])[0]
-        return Pose(tuple(at.tolist()), tuple(quat.tolist()), self.scale * scale)
+        return Pose(tuple(at.tolist()), tuple(quat.tolist()), (np.asarray(self.scale) * scale).tolist())
 
 
 @dataclass(frozen=True, eq=False)

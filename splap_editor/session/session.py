@@ -128,7 +128,7 @@ class Session:
         if not np.array_equal(getattr(scene, name), mask):
             self.history.push(ChangeMask(scene, name, mask, label))
 
-    def add_handle(self, region: Region, *, pose: Pose = Pose(), name: str | None = None) -> Handle:
+    def add_handle(self, region: Region, *, pose: Pose | None = None, name: str | None = None) -> Handle:
         """Place a handle, make it the active one, and prepare to move it."""
         scene = self._scene()
         handle_id = scene.edit.next_handle_id()
@@ -137,7 +137,7 @@ class Session:
             name or f"Handle {handle_id}",
             HANDLE_COLORS[(handle_id - 1) % len(HANDLE_COLORS)],
             region,
-            pose,
+            pose or Pose(),
         )
         self.is_halted = False
         self.change_edit(scene.edit.with_handle(handle), "Place handle")
