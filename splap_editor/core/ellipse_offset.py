@@ -131,14 +131,15 @@ def _in_frame(disc, other):
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")
-def _meeting(c0, c1, a00, a01, a10, a11):
-    """Minimise ``max(|y|, |c + A y|)``: the square of the minimum, and y.
+def _meeting(c0, c1, a00, a01, a10, a11, limit):
+    """Minimise ``max(|y|², |c + A y|²)``: the minimum, and y.
 
     The dual is a concave function of one number t in [0, 1],
     ``φ(t) = t (1 - t) Σ_k e_k² / (1 - t + t s_k)`` with s_k the eigenvalues of
     A Aᵀ and e the coordinates of c along its eigenvectors (the contact function
     of Perram and Wertheim in the plane); its maximum is found by Newton's
-    method inside a shrinking bracket.
+    method inside a shrinking bracket. Every φ(t) is a lower bound, so the
+    search ends with inf at the first one above ``limit``.
     """
     p, q, r = a00 * a00 + a01 * a01, a00 * a10 + a01 * a11, a10 * a10 + a11 * a11
     half, radius = 0.5 * (p - r), np.hypot(0.5 * (p - r), q)
@@ -163,6 +164,8 @@ def _meeting(c0, c1, a00, a01, a10, a11):
     if low < high:
         for _ in range(_NEWTON_STEPS):
             d1, d2 = 1.0 - t + t * s1, 1.0 - t + t * s2
+            if t * (1.0 - t) * (w1 / d1 + w2 / d2) > limit:
+                return np.inf, 0.0, 0.0
             slope = w1 * ((1.0 - t) ** 2 - t * t * s1) / (d1 * d1) + w2 * ((1.0 - t) ** 2 - t * t * s2) / (d2 * d2)
             if slope > 0.0:
                 low = t
@@ -193,7 +196,7 @@ def one_way_touch(disc, other, epsilon, limit):
     steep = np.sqrt(g0 * g0 + g1 * g1)
     if abs(z0) - epsilon > limit * steep:
         return np.inf
-    squared, y0, y1 = _meeting(c0, c1, a00, a01, a10, a11)
+    squared, y0, y1 = _meeting(c0, c1, a00, a01, a10, a11, limit * limit)
     if squared > limit * limit:
         return np.inf
     height = z0 + g0 * y0 + g1 * y1
@@ -264,7 +267,7 @@ def _reaches_height(height, c0, c1, a00, a01, a10, a11, z0, g0, g1):
 @nb.njit(nogil=True, cache=True, error_model="numpy")
 def _one_way_offset(disc, other):
     c0, c1, a00, a01, a10, a11, z0, g0, g1 = _in_frame(disc, other)
-    squared, y0, y1 = _meeting(c0, c1, a00, a01, a10, a11)
+    squared, y0, y1 = _meeting(c0, c1, a00, a01, a10, a11, 1.0)
     if squared > 1.0:
         return np.inf
     height = z0 + g0 * y0 + g1 * y1

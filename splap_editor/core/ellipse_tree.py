@@ -13,6 +13,7 @@ sizes in one tree alike, a handful of huge ellipses loosens no bound but theirs.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numba as nb
 import numpy as np
@@ -107,10 +108,10 @@ def ellipse_tree(ellipses: Ellipses) -> EllipseTree:
     places[nodes] = np.arange(len(nodes))
     reaches = reaches[nodes]
     rows = discs(ellipses)[nodes]
-    starts = np.flatnonzero(np.diff(sizes[nodes], prepend=-1))
-    classes = np.zeros((len(starts), 4), np.int64)
+    bounds = np.append(np.flatnonzero(np.diff(sizes[nodes], prepend=-1)), len(nodes))
+    classes = np.zeros((len(bounds) - 1, 4), np.int64)
     boxes, slot = [], 0
-    for c, (first, end) in enumerate(zip(starts, [*starts[1:], len(nodes)], strict=True)):
+    for c, (first, end) in enumerate(pairwise(bounds)):
         box = _class_boxes(rows[first:end, :3], reaches[first:end])
         classes[c] = first, end, slot, len(box) // 2
         boxes.append(box)
@@ -190,8 +191,8 @@ def nearest_touches(queries, rows, reaches, nodes, classes, boxes, labels, range
     for q in range(len(queries)):
         me = queries[q]
         disc, reach, label, node = rows[me], reaches[me], labels[me], nodes[me]
-        partners[q, :] = -1
-        scales[q, :] = np.inf
+        for k in range(m):
+            partners[q, k], scales[q, k] = -1, np.inf
         for c in range(len(classes)):
             first, end, base, n_leaves = classes[c]
             stack[0], gaps[0], height = 1, _box_distance(boxes[base + 1], disc), 1

@@ -111,7 +111,8 @@ def _push(heap_keys, heap_nodes, size, key, node):
     """Put an entry into a binary heap ordered by key, then node; returns its arrays, longer ones if they were full."""
     if size == len(heap_keys):
         keys, nodes = np.empty(2 * size), np.empty(2 * size, np.int32)
-        keys[:size], nodes[:size] = heap_keys, heap_nodes
+        for i in range(size):
+            keys[i], nodes[i] = heap_keys[i], heap_nodes[i]
         heap_keys, heap_nodes = keys, nodes
     i = size
     while i > 0:

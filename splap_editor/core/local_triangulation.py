@@ -74,8 +74,9 @@ def _stars(first, centers, normals, indptr, indices, corners, counts):
         edge = _HORIZON * farthest
         px[0], py[0], px[1], py[1] = -edge, -edge, edge, -edge
         px[2], py[2], px[3], py[3] = edge, edge, -edge, edge
-        side[:4] = -1
         n = 4
+        for a in range(n):
+            side[a] = -1
         for t in range(m):
             half = 0.5 * (x[t] * x[t] + y[t] * y[t])
             # On a nearer neighbour's spot rounding alone would decide which of the two gets the side.
@@ -95,7 +96,8 @@ def _stars(first, centers, normals, indptr, indices, corners, counts):
                     cut = True
             if cut:
                 n = kept
-                px[:n], py[:n], side[:n] = qx[:n], qy[:n], label[:n]
+                for a in range(n):
+                    px[a], py[a], side[a] = qx[a], qy[a], label[a]
         count = 0
         for a in range(n):
             b = a + 1 if a + 1 < n else 0

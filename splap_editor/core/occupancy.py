@@ -189,10 +189,10 @@ def scene_scale(points: NDArray[np.float64]) -> float:
 
 def _ordered_axes(scales: NDArray[np.float64], normal_axis: int | None) -> NDArray[np.int8]:
     """(N, 3) stored columns of the major axis, the minor axis and the normal; equal scales keep their order."""
+    scales = np.where(np.isnan(scales), np.inf, scales)
     if scales.shape[1] == 2:
         scales = np.concatenate([scales, np.full((len(scales), 1), -1.0)], axis=1)
     elif normal_axis is not None:
-        scales = scales.copy()
         scales[:, normal_axis] = -1.0
     return np.argsort(-scales, axis=1, kind="stable").astype(np.int8)
 
