@@ -19,8 +19,8 @@ class Finding:
     ----------
     kind : str
         ``"scales"``, ``"opacities"``, ``"rotations"``, ``"zero_rotations"``,
-        ``"filters"``, ``"thresholds"``, ``"duplicates"``, ``"giants"`` or
-        ``"all_zero"``.
+        ``"filters"``, ``"colours"``, ``"all_zero"``, ``"duplicates"``,
+        ``"giants"`` or ``"thresholds"``.
     sentence : str
         What it is, with the number of rows.
     rows : (n,) int64
@@ -36,7 +36,7 @@ def unusable_rows(splats: Splats) -> list[Finding]:
     """Rows that cannot be drawn or deformed: not finite, or without a rotation.
 
     Infinite opacity (opaque) and scales of ``-inf`` (flat) are legal. One pass
-    over each small column; nothing is converted.
+    over each column; nothing is converted.
     """
     scales, quats = splats.log_scales, splats.quats
     opacities = splats.logit_opacities
@@ -54,6 +54,9 @@ def unusable_rows(splats: Splats) -> list[Finding]:
         findings.append(Finding("zero_rotations", _sentence("{} a zero rotation", len(zero)), zero))
     if splats.filter_radii is not None:
         _add(findings, "filters", "{} a filter_3D that is not finite", ~np.isfinite(splats.filter_radii))
+    if not (_finite(splats.sh0) and _finite(splats.shN)):
+        bad = ~(np.isfinite(splats.sh0).all(axis=1) & np.isfinite(splats.shN).all(axis=(1, 2)))
+        _add(findings, "colours", "{} a colour that is not finite", bad)
     return findings
 
 

@@ -72,7 +72,8 @@ def read_ply(path: str | os.PathLike[str], *, layout: str | None = None, progres
         one sentence for the user and what to do.
     """
     path = Path(path)
-    table = read_table(path, accepts=_require_splats, progress=part_of(progress, 0.0, 0.9))
+    glance = _Glance()
+    table = read_table(path, accepts=_require_splats, glance=glance.look, progress=part_of(progress, 0.0, 0.9))
     npz = sibling_npz(path)
     thresholds: list[Thresholds | str] = []
 
@@ -99,12 +100,31 @@ def read_ply(path: str | os.PathLike[str], *, layout: str | None = None, progres
             thresholds=usable and usable.cutoffs,
             opacity_floor=usable.opacity_floor if usable else 0.0,
         )
-    _require_finite_positions(splats.means, path.name)
     if found.bound:
         warnings.append(_BOUND.format(found.name))
-    warnings += [f"{finding.sentence}; left as they are." for finding in unusable_rows(splats)]
+    if found.activated_opacity or not glance.shows_only_usable_rows(table.n_rows):
+        _require_finite_positions(splats.means, path.name)
+        warnings += [f"{finding.sentence}; left as they are." for finding in unusable_rows(splats)]
     progress(1.0)
     return SplatFile(path, splats, table, found, warnings)
+
+
+class _Glance:
+    """A look at rows as they are read that spares clean files a second pass."""
+
+    def __init__(self) -> None:
+        self._n_clean = 0
+
+    def look(self, rows: NDArray) -> None:
+        """Count the rows of a block if all their numbers are finite and no rotation begins with zero."""
+        types = {dtype for dtype, _ in rows.dtype.fields.values()}
+        if types == {np.dtype(np.float32)} and "rot_0" in rows.dtype.names:
+            clean = np.isfinite(rows.view(np.float32)).all() and (rows["rot_0"] != 0).all()
+            self._n_clean += len(rows) if clean else 0
+
+    def shows_only_usable_rows(self, n_rows: int) -> bool:
+        """Whether all rows were seen and clean."""
+        return self._n_clean == n_rows
 
 
 _NO_THRESHOLDS = (

@@ -1,4 +1,4 @@
-"""PLY files with list properties: read and written by plyfile, row by row."""
+"""Binary PLY files with list properties: read by plyfile, row by row."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -7,13 +7,13 @@ from io import BytesIO
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.io.ply_header import PlyError, PlyHeader, ply_header
+from splap_editor.io.ply_header import PlyError, PlyHeader
 from splap_editor.io.ply_table import CellChanges, NewColumn, PlyTable, cast_values
 
 
 @dataclass(frozen=True, eq=False)
 class ListTable(PlyTable):
-    """A PLY file with lists somewhere: its rows differ in size.
+    """A binary PLY file with lists somewhere: its rows differ in size.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def list_table(name: str, header: PlyHeader, body: NDArray[np.uint8]) -> ListTab
     elements = {element.name: element.data for element in ply.elements}
     scalar = [p.name for p in header.element("vertex").properties if p.length_type is None]
     columns = {column: elements["vertex"][column] for column in scalar}
-    tail = b"" if header.is_ascii else body[stream.tell() - len(plain) :].tobytes()
+    tail = body[stream.tell() - len(plain) :].tobytes()
     return ListTable(name, header, body, columns, elements, tail)
 
 
@@ -89,22 +89,26 @@ def _with_columns(rows: NDArray, new_columns: list[NewColumn]) -> NDArray:
 
 
 def _body(header: PlyHeader, elements: dict[str, NDArray]) -> bytes:
-    """Bytes of the elements in the header's format and order, with its list types."""
-    import plyfile
+    """Bytes of the elements in the header's byte order, with its list types.
 
-    described = []
-    for element in header.elements:
-        lists = [p for p in element.properties if p.length_type]
-        described.append(
-            plyfile.PlyElement.describe(
-                elements[element.name],
-                element.name,
-                len_types={p.name: p.length_type for p in lists},
-                val_types={p.name: p.type for p in lists},
-            )
-        )
+    plyfile writes scalars beside lists in the machine's byte order whatever
+    the header says, so this does not go through it.
+    """
     order = header.byte_order
-    stream = BytesIO()
-    plyfile.PlyData(described, text=header.is_ascii, byte_order=order).write(stream)
-    data = stream.getvalue()
-    return data[len(ply_header(data, "").raw) :]
+    parts = []
+    for element in header.elements:
+        rows = elements[element.name]
+        if not element.has_lists:
+            fields = [(name, rows.dtype[name].newbyteorder(order)) for name in rows.dtype.names]
+            parts.append(rows.astype(fields).tobytes())
+            continue
+        types = {p.name: (np.dtype(order + p.type), p.length_type) for p in element.properties}
+        float_type = (np.dtype(order + "f4"), None)
+        for row in rows:
+            for name in rows.dtype.names:
+                # Columns that the header does not have are added ones.
+                dtype, length_type = types.get(name, float_type)
+                if length_type is not None:
+                    parts.append(np.array(len(row[name]), order + length_type).tobytes())
+                parts.append(np.asarray(row[name], dtype).tobytes())
+    return b"".join(parts)

@@ -4,6 +4,7 @@ import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,9 @@ from splap_editor.io.ply_header import LONGEST_HEADER, PlyError, PlyHeader, ply_
 CellChanges = dict[str, tuple[NDArray[np.intp], NDArray]]
 """Column name → rows (counted from the first row of the block) and the values to put there."""
 
-_READ_BYTES = 16 << 20
+_READ_BYTES = 1 << 20
+"""Read at a time: little enough to be still in the cache when the rows are glanced at."""
+
 _BLOCK_ROWS = 1 << 15
 
 
@@ -89,7 +92,7 @@ class PlyTable:
             Columns to add.
         """
         rows = self.element("vertex")
-        start = rows.__array_interface__["data"][0] - self.body.__array_interface__["data"][0]
+        start = _distance(rows, self.body)
         yield self.body[:start]
         for lo in range(0, len(rows), _BLOCK_ROWS):
             hi = min(lo + _BLOCK_ROWS, len(rows))
@@ -129,6 +132,7 @@ def read_table(
     path: str | os.PathLike[str],
     *,
     accepts: Callable[[PlyHeader, str], None] = lambda header, name: None,
+    glance: Callable[[NDArray], None] | None = None,
     progress: Progress = no_progress,
 ) -> PlyTable:
     """Read a PLY file without interpreting its columns.
@@ -140,6 +144,9 @@ def read_table(
     accepts : callable (header, name)
         Raises if a file with this header is not wanted; asked before anything
         of the file's size is allocated.
+    glance : callable (rows), optional
+        Shown the vertex rows of a binary file, block by block as structured
+        arrays, while they are cheap to look at. Other files are not shown.
     progress : Progress
         Told the share of bytes read.
 
@@ -156,18 +163,14 @@ def read_table(
             raise PlyError(f"{path} is a directory. Choose the .ply file inside it.")
         if path.exists() and not path.is_file():
             raise PlyError(f"{path} is not a regular file. Choose a .ply file.")
-        with open(path, "rb") as file:
+        with open(path, "rb", buffering=0) as file:
             header = ply_header(file.read(LONGEST_HEADER), name)
             accepts(header, name)
             n_bytes = os.fstat(file.fileno()).st_size - len(header.raw)
             _require_room(header, n_bytes, name)
             file.seek(len(header.raw))
             body = np.empty(n_bytes, np.uint8)
-            for lo in range(0, n_bytes, _READ_BYTES):
-                wanted = body[lo : lo + _READ_BYTES]
-                if file.readinto(wanted) != len(wanted):
-                    raise PlyError(f"{name} became shorter while it was read. Open it again once it is written.")
-                progress((lo + len(wanted)) / n_bytes)
+            _read_body(file, body, header, name, glance, progress)
         return _table(name, header, body)
     except FileNotFoundError:
         raise PlyError(f"{path} does not exist. Check the path.") from None
@@ -177,6 +180,39 @@ def read_table(
         raise PlyError(f"{path} could not be read: {error.strerror or error}.") from error
     except MemoryError:
         raise PlyError(f"{name} does not fit in memory. Close other programs or crop the scene first.") from None
+
+
+def _read_body(
+    file: BinaryIO,
+    body: NDArray[np.uint8],
+    header: PlyHeader,
+    name: str,
+    glance: Callable[[NDArray], None] | None,
+    progress: Progress,
+) -> None:
+    """Fill the body from the file, block by block."""
+    rows, start = None, 0
+    if glance is not None and not header.is_ascii and not any(element.has_lists for element in header.elements):
+        rows = PlyTable(name, header, body).element("vertex")
+        start = _distance(rows, body)
+    n_seen, next_report = 0, 0.0
+    for lo in range(0, len(body), _READ_BYTES):
+        wanted = body[lo : lo + _READ_BYTES]
+        if file.readinto(wanted) != len(wanted):
+            raise PlyError(f"{name} became shorter while it was read. Open it again once it is written.")
+        hi = lo + len(wanted)
+        if rows is not None:
+            n_whole = min(max(hi - start, 0) // rows.dtype.itemsize, len(rows))
+            glance(rows[n_seen:n_whole])
+            n_seen = n_whole
+        if hi >= next_report * len(body):
+            progress(hi / len(body))
+            next_report += 0.05
+
+
+def _distance(rows: NDArray, body: NDArray[np.uint8]) -> int:
+    """Offset of a view in the body."""
+    return rows.__array_interface__["data"][0] - body.__array_interface__["data"][0]
 
 
 def _table(name: str, header: PlyHeader, body: NDArray[np.uint8]) -> PlyTable:

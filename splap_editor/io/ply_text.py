@@ -52,26 +52,46 @@ class TextTable(PlyTable):
 
     def _lines(self, lo: int, hi: int, changed: CellChanges, new_columns: list[NewColumn]) -> list[bytes]:
         """Lines of a block of rows, tokens replaced and added."""
-        position = {name: i for i, name in enumerate(self.columns)}
-        replaced: dict[int, list[tuple[int, bytes]]] = {}
+        vertex = self.header.element("vertex")
+        replaced: dict[int, list[tuple[str, bytes]]] = {}
         for name, (rows, values) in changed.items():
             words = _words(cast_values(values, self.columns[name].dtype))
             for row, word in zip(rows.tolist(), words, strict=True):
-                replaced.setdefault(row, []).append((position[name], word))
-        added = [(position[c.after], _words(c.values[lo:hi])) for c in new_columns]
+                replaced.setdefault(row, []).append((name, word))
+        added = [(c.after, _words(c.values[lo:hi])) for c in new_columns]
         lines = []
         for row in range(hi - lo):
             line = self.body[self.line_starts[lo + row] : self.line_starts[lo + row + 1]].tobytes()
             if row in replaced or added:
                 # Odd pieces are the numbers, even ones the blanks around them.
                 pieces = re.split(rb"(\S+)", line)
-                for column, word in replaced.get(row, ()):
-                    pieces[2 * column + 1] = word
-                for column, words in added:
-                    pieces[2 * column + 1] += b" " + words[row]
+                place = _last_words(vertex, pieces[1::2])
+                for name, word in replaced.get(row, ()):
+                    pieces[2 * place[name] + 1] = word
+                for name, words in added:
+                    pieces[2 * place[name] + 1] += b" " + words[row]
                 line = b"".join(pieces)
             lines.append(line)
         return lines
+
+
+def _last_words(vertex: PlyElement, words: list[bytes]) -> dict[str, int]:
+    """Number of the word of each column in a line; the last one of a list.
+
+    Raises
+    ------
+    ValueError, IndexError
+        If the line is not such a row.
+    """
+    place, next_word = {}, 0
+    for p in vertex.properties:
+        if p.length_type is not None:
+            next_word += int(words[next_word])
+        place[p.name] = next_word
+        next_word += 1
+    if next_word != len(words):
+        raise ValueError(f"{next_word} words expected, got {len(words)}")
+    return place
 
 
 def _words(values: NDArray) -> list[bytes]:
@@ -103,12 +123,9 @@ def text_table(name: str, header: PlyHeader, body: NDArray[np.uint8]) -> PlyTabl
             break
         first += element.count
     vertex = header.element("vertex")
-    if vertex.has_lists:
-        from splap_editor.io.ply_lists import list_table
-
-        return list_table(name, header, body)
     starts = bounds[first : first + vertex.count + 1]
-    columns = _parsed_columns(name, vertex, body, starts)
+    parsed = _parsed_list_columns if vertex.has_lists else _parsed_columns
+    columns = parsed(name, vertex, body, starts)
     return TextTable(name, header, body, columns, starts)
 
 
@@ -125,14 +142,33 @@ def _parsed_columns(
         except ValueError:
             numbers = None
         if numbers is None or numbers.shape != (hi - lo, len(columns)):
-            row = _first_bad_line(text, lo, len(columns))
-            raise PlyError(
-                f"{name} is damaged or cut short: the line of row {row:,} is not {len(columns)} numbers. "
-                "Copy or export it again."
-            )
+            raise _damage(name, _first_bad_line(text, lo, len(columns)), f"{len(columns)} numbers")
         for column, values in zip(columns.values(), numbers.T, strict=True):
             column[lo:hi] = cast_values(values, column.dtype)
     return columns
+
+
+def _parsed_list_columns(
+    name: str, vertex: PlyElement, body: NDArray[np.uint8], starts: NDArray[np.intp]
+) -> dict[str, NDArray]:
+    """Parse the scalar numbers of vertex lines that also hold lists, line by line."""
+    columns = {p.name: np.empty(vertex.count, p.type) for p in vertex.properties if p.length_type is None}
+    for row in range(vertex.count):
+        words = body[starts[row] : starts[row + 1]].tobytes().split()
+        try:
+            place = _last_words(vertex, words)
+            for column, values in columns.items():
+                values[row] = cast_values(np.float64(words[place[column]]), values.dtype)
+        except (ValueError, IndexError):
+            raise _damage(name, row, "the promised numbers and lists") from None
+    return columns
+
+
+def _damage(name: str, row: int, wanted: str) -> PlyError:
+    """Exception for a line that holds something else than it should."""
+    return PlyError(
+        f"{name} is damaged or cut short: the line of row {row:,} is not {wanted}. Copy or export it again."
+    )
 
 
 def _first_bad_line(text: bytes, row: int, n_columns: int) -> int:

@@ -104,9 +104,7 @@ def recipe_from_json(value: Any) -> Recipe:
         if version is None:
             raise RecipeError(f'version is missing: put "version": {VERSION} into it')
         if isinstance(version, bool) or version != VERSION:
-            raise RecipeError(
-                f"version must be {VERSION}, got {shown(version)}: a newer one needs a newer SpLap Editor"
-            )
+            raise RecipeError(f"version must be {VERSION}, got {shown(version)}: a newer one needs a newer editor")
     recipe = JsonObject(value, "", _RECIPE_KEYS, RecipeError)
     free_radius = None
     if not recipe.is_null("free_radius"):

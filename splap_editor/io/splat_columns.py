@@ -172,10 +172,11 @@ def column_group(columns: dict[str, NDArray], names: tuple[str, ...]) -> NDArray
         return view
     dtype = np.result_type(np.float32, *(part.dtype.newbyteorder("=") for part in parts))
     group = np.empty((len(parts[0]), len(parts)), dtype)
-    # Row blocks keep each record in the cache while its columns are picked out.
-    for lo in range(0, len(group), _BLOCK_ROWS):
-        for c, part in enumerate(parts):
-            group[lo : lo + _BLOCK_ROWS, c] = part[lo : lo + _BLOCK_ROWS]
+    # Row blocks keep each record in the cache while its columns are picked out. A NaN stays one, of either kind.
+    with np.errstate(invalid="ignore"):
+        for lo in range(0, len(group), _BLOCK_ROWS):
+            for c, part in enumerate(parts):
+                group[lo : lo + _BLOCK_ROWS, c] = part[lo : lo + _BLOCK_ROWS]
     return group
 
 
