@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.splats import Splats
-from splap_editor.io.sample_placement import even_points, fitted_axes, random_tangents, tilted_frames
+from splap_editor.io.sample_placement import even_points, fitted_axes, random_tangents, tilted_normals
 from splap_editor.io.sample_shapes import SHAPES, Surface
 
 _SH0 = 0.28209479177387814
@@ -34,8 +34,9 @@ class SplatStyle:
     size_spread, aspect_spread : float
         Standard deviation of the logarithm of size and of aspect.
     overhang : float
-        How far the two-sigma ends may stick out into the air, as a share of the semi-axis. Longer
-        axes are shortened, as training does at rims and where the surface curves; inf trims nothing.
+        How far the rim of an occupancy ellipse may stand in the air: standard deviation of a
+        half-normal, in world units. Longer axes are shortened, as training does at borders and
+        where the surface curves; inf trims nothing.
     tilt : float
         Median angle between splat and surface normal, in degrees.
     depth : float
@@ -51,7 +52,7 @@ class SplatStyle:
     aspect: float = 1.5
     size_spread: float = 0.25
     aspect_spread: float = 0.25
-    overhang: float = 0.5
+    overhang: float = 0.012
     tilt: float = 3.0
     depth: float = 0.0
     opacities: tuple[float, float, float] = (0.8, 0.97, 0.999)
@@ -72,12 +73,12 @@ THIN = SplatStyle()
 """One clean layer of nearly opaque splats."""
 
 TRAINED = SplatStyle(
-    coverage=11.0,
+    coverage=18.0,
     jitter=0.8,
     aspect=3.0,
     size_spread=0.5,
     aspect_spread=0.65,
-    overhang=0.25,
+    overhang=0.018,
     tilt=18.0,
     depth=0.010,
     opacities=(0.10, 0.60, 0.99),
@@ -132,17 +133,19 @@ def surface_splats(surface: Surface, n_splats: int, style: SplatStyle = THIN, *,
     rng = np.random.default_rng(seed)
     faces, points = even_points(surface, n_splats, style.jitter, rng)
     normals = surface.normals[faces]
-    area = surface.areas.sum() / n_splats * style.coverage / 4  # of one one-sigma ellipse
-    aspects = np.maximum(1.0, style.aspect * np.exp(style.aspect_spread * rng.standard_normal(n_splats)))
-    sizes = np.sqrt(area / np.pi) * np.exp(style.size_spread * rng.standard_normal(n_splats) - style.size_spread**2)
-    scales = np.stack([sizes * np.sqrt(aspects), sizes / np.sqrt(aspects)], 1)
-    axes, scales = fitted_axes(surface, points, normals, scales, style.overhang, rng)
-    frames = tilted_frames(axes, normals, style.tilt, rng)
     if surface.closed and style.depth > 0:
-        # |Gaussian| has its median at 0.674 sigma.
+        # The median of |Gaussian| is 0.674 sigma.
         points = points - normals * (style.depth / 0.674 * abs(rng.standard_normal(n_splats)))[:, None]
+    normals = tilted_normals(normals, style.tilt, rng)
+    logits = _logits(n_splats, style, rng)
+    scales = _scales(surface.areas.sum() / n_splats, style, rng, n_splats)
+    # Where contributions fall below 1/255 an ellipse ends for the eye: that is what training trims.
+    cutoffs = np.sqrt(2 * np.maximum(np.log(255) - np.log1p(np.exp(-logits)), 0.1))[:, None]
+    axes, reaches = fitted_axes(surface, points, normals, cutoffs * scales, style.overhang, rng)
+    scales = reaches / cutoffs
+    frames = np.stack([axes, np.cross(normals, axes), normals], 2)
     order = rng.permutation(n_splats)
-    splats = _splats(points[order], scales[order], frames[order], style, rng)
+    splats = _splats(points[order], scales[order], frames[order], logits[order], style.sh_degree, rng)
     return Sample(splats, surface, faces[order])
 
 
@@ -159,7 +162,7 @@ def line_splats(n_splats: int) -> Splats:
     means = np.stack([x, np.zeros(n_splats), np.zeros(n_splats)], 1)
     scales = np.full((n_splats, 2), 0.5 * 2.6 / max(n_splats, 2))
     frames = np.tile(np.eye(3), (n_splats, 1, 1))
-    return _splats(means, scales, frames, THIN, np.random.default_rng(0))
+    return _splats(means, scales, frames, np.full(n_splats, 5.0), 0, np.random.default_rng(0))
 
 
 def big_scene(n_splats: int, *, coverage: float = 3.0, sh_degree: int = 3, seed: int = 0) -> Splats:
@@ -196,13 +199,14 @@ def big_scene(n_splats: int, *, coverage: float = 3.0, sh_degree: int = 3, seed:
     means = np.concatenate([ball, np.column_stack([flat, heights])])
     normals = np.concatenate([directions, slopes / np.linalg.norm(slopes, axis=1, keepdims=True)])
     areas = np.concatenate([np.full(n_ball, 4 * np.pi * 0.38 / n_ball), np.full(n_sheets, 2 * 2.6**2 / n_sheets)])
-    sizes = np.sqrt(areas * coverage / 4 / np.pi) * np.exp(0.25 * rng.standard_normal(n_splats))
-    aspects = np.maximum(1, 1.6 * np.exp(0.3 * rng.standard_normal(n_splats)))
-    scales = np.stack([sizes * np.sqrt(aspects), sizes / np.sqrt(aspects)], 1)
-    frames = tilted_frames(random_tangents(normals, rng), normals, 4.0, rng)
-    style = replace(THIN, sh_degree=sh_degree, opacities=(0.3, 0.9, 0.99))
+    style = SplatStyle(coverage=coverage, tilt=4.0, opacities=(0.3, 0.9, 0.99))
+    normals = tilted_normals(normals, style.tilt, rng)
+    axes = random_tangents(normals, rng)
+    frames = np.stack([axes, np.cross(normals, axes), normals], 2)
+    scales = _scales(areas, style, rng, n_splats)
+    logits = _logits(n_splats, style, rng)
     order = rng.permutation(n_splats)
-    return _splats(means[order], scales[order], frames[order], style, rng)
+    return _splats(means[order], scales[order], frames[order], logits[order], sh_degree, rng)
 
 
 def write_sample(path: Path | str, splats: Splats) -> None:
@@ -244,24 +248,40 @@ def _quats(frames: NDArray[np.float64]) -> NDArray[np.float64]:
     return quats / np.linalg.norm(quats, axis=1, keepdims=True)
 
 
+def _logits(n_splats: int, style: SplatStyle, rng: np.random.Generator) -> NDArray[np.float64]:
+    """Logits of opacities with the style's percentiles."""
+    low, middle, high = np.log(np.array(style.opacities)) - np.log1p(-np.array(style.opacities))
+    normal = rng.standard_normal(n_splats)
+    # 5 % and 95 % lie 1.645 standard deviations from the median; each side has its own.
+    return middle + normal * np.where(normal < 0, middle - low, high - middle) / 1.645
+
+
+def _scales(
+    areas: NDArray[np.float64] | float, style: SplatStyle, rng: np.random.Generator, n_splats: int
+) -> NDArray[np.float64]:
+    """(N, 2) standard deviations of splats that have ``areas`` of surface each to cover."""
+    sizes = np.sqrt(areas * style.coverage / 4 / np.pi)
+    # The square of a log-normal has its mean at twice the variance: take that off to keep the coverage.
+    sizes = sizes * np.exp(style.size_spread * rng.standard_normal(n_splats) - style.size_spread**2)
+    aspects = np.maximum(1.0, style.aspect * np.exp(style.aspect_spread * rng.standard_normal(n_splats)))
+    return np.stack([sizes * np.sqrt(aspects), sizes / np.sqrt(aspects)], 1)
+
+
 def _splats(
     means: NDArray[np.float64],
     scales: NDArray[np.float64],
     frames: NDArray[np.float64],
-    style: SplatStyle,
+    logits: NDArray[np.float64],
+    sh_degree: int,
     rng: np.random.Generator,
 ) -> Splats:
-    """Stored columns in float32: logs, logits, unnormalised quaternions, a checked and banded colour."""
+    """Stored columns in float32: logarithms, unnormalised quaternions, a checked and banded colour."""
     n = len(means)
-    low, middle, high = np.log(np.array(style.opacities)) - np.log1p(-np.array(style.opacities))
-    normal = rng.standard_normal(n)
-    # 5 % and 95 % lie 1.645 standard deviations from the median; each side has its own.
-    logits = middle + normal * np.where(normal < 0, middle - low, high - middle) / 1.645
     lengths = np.exp(rng.uniform(np.log(0.4), np.log(9.0), n))[:, None] * np.where(rng.random(n) < 0.5, -1, 1)[:, None]
     checks = (np.floor(4 * means + 0.01).sum(1) % 2)[:, None]
     bands = 0.5 + 0.5 * np.sin(2.4 * means[:, [2, 0, 1]] + [0.0, 2.1, 4.2])
     colors = np.clip(0.2 + 0.5 * bands + 0.16 * checks + 0.03 * rng.standard_normal((n, 3)), 0, 1)
-    n_rest = (style.sh_degree + 1) ** 2 - 1
+    n_rest = (sh_degree + 1) ** 2 - 1
     return Splats(
         means=means.astype(np.float32),
         log_scales=np.log(scales).astype(np.float32),

@@ -12,17 +12,17 @@ def even_points(
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Faces and points of the splats: evenly spread ones first, the rest at random."""
     n_even = round(n_splats * (1 - jitter))
-    faces, points = _random_points(surface, 5 * n_even + n_splats, rng)
+    faces, points = random_points(surface, 5 * n_even + n_splats, rng)
     pool, spare = slice(0, 5 * n_even), np.arange(5 * n_even, len(points))
-    # Random dart throwing fills 0.7 / r² per unit of area; a little closer leaves some to drop.
-    radius = np.sqrt(0.62 * surface.areas.sum() / max(n_even, 1))
+    # Five darts for each place fill about 0.5 / r² per unit of area; a little closer leaves some to drop.
+    radius = np.sqrt(0.47 * surface.areas.sum() / max(n_even, 1))
     # Both sides of a thin wall have opposite normals: as coordinates these keep the sides from competing.
     taken = _far_apart(np.hstack([points[pool], radius * surface.normals[faces[pool]]]), radius)[:n_even]
     chosen = np.concatenate([taken, spare[: n_splats - len(taken)]])
     return faces[chosen], points[chosen]
 
 
-def _random_points(surface: Surface, n: int, rng: np.random.Generator) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def random_points(surface: Surface, n: int, rng: np.random.Generator) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Area-weighted random faces and points on them."""
     faces = rng.choice(len(surface.faces), n, p=surface.areas / surface.areas.sum())
     u, v = rng.random((2, n))
@@ -55,69 +55,74 @@ def random_tangents(normals: NDArray[np.float64], rng: np.random.Generator) -> N
 
 def fitted_axes(
     surface: Surface,
-    points: NDArray[np.float64],
+    centers: NDArray[np.float64],
     normals: NDArray[np.float64],
-    scales: NDArray[np.float64],
+    reaches: NDArray[np.float64],
     overhang: float,
     rng: np.random.Generator,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Major axes, each the roomiest of six directions, and scales shortened to what the surface carries there."""
+    """Major axes, each the roomiest of four directions, and semi-axes (N, 2) shortened to what the surface carries.
+
+    How far an end may stand in the air is half-normal with deviation ``overhang``, splat by splat.
+    """
     major = random_tangents(normals, rng)
     if np.isinf(overhang):
-        return major, scales
+        return major, reaches
     minor = np.cross(normals, major)
-    sample = np.concatenate([surface.vertices, _random_points(surface, 12 * len(surface.faces), rng)[1]])
-    tree = cKDTree(sample)
-    resolution = np.sqrt(surface.areas.sum() / len(sample))
-    best, best_scales = major, np.zeros_like(scales)
-    for angle in np.arange(6) * np.pi / 6:
+    allowed = overhang * abs(rng.standard_normal(len(centers)))
+    air = _Air(surface, rng)
+    best, best_reaches = major, np.zeros_like(reaches)
+    for angle in np.arange(4) * np.pi / 4:
         along = np.cos(angle) * major + np.sin(angle) * minor
         across = np.cross(normals, along)
         room = np.stack([
-            _room(tree, points, axis, 2 * scales[:, column], overhang, resolution)
-            for column, axis in enumerate((along, across))
+            air.room(centers, axis, reaches[:, column], allowed) for column, axis in enumerate((along, across))
         ], 1)  # fmt: skip
-        better = (room.prod(1) > best_scales.prod(1))[:, None]
-        best, best_scales = np.where(better, along, best), np.where(better, room, best_scales)
-    return best, best_scales
+        better = (room.prod(1) > best_reaches.prod(1))[:, None]
+        best, best_reaches = np.where(better, along, best), np.where(better, room, best_reaches)
+    return best, best_reaches
 
 
-def _room(
-    tree: cKDTree,
-    points: NDArray[np.float64],
-    axes: NDArray[np.float64],
-    reaches: NDArray[np.float64],
-    overhang: float,
-    resolution: float,
-) -> NDArray[np.float64]:
-    """One-sigma lengths along the axes whose two-sigma ends stay within the overhang of the surface."""
-    lengths = np.zeros_like(reaches)
-    open_ = np.arange(len(points))
-    for share in (1.0, 0.75, 0.55, 0.4, 0.3, 0.2):
-        step = (share * reaches[open_])[:, None] * axes[open_]
-        ends = np.concatenate([points[open_] - step, points[open_] + step])
-        off = tree.query(ends)[0].reshape(2, -1).max(0)
-        fits = off <= overhang * share * reaches[open_] + resolution
-        lengths[open_] = share * reaches[open_] / 2
-        open_ = open_[~fits]
-        if not len(open_):
-            break
-    return lengths
+class _Air:
+    """What lies outside a surface, known from dense samples of it; for a sheet, both sides."""
+
+    def __init__(self, surface: Surface, rng: np.random.Generator) -> None:
+        faces, self.points = random_points(surface, max(20_000, 5 * len(surface.faces)), rng)
+        self.normals, self.closed = surface.normals[faces], surface.closed
+        self.tree = cKDTree(self.points)
+        self.resolution = np.sqrt(surface.areas.sum() / len(self.points))
+
+    def distances(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distance of each point into the air, 0 inside the solid."""
+        gap, nearest = self.tree.query(points)
+        height = ((points - self.points[nearest]) * self.normals[nearest]).sum(1)
+        beside = np.maximum(np.sqrt(np.maximum(gap**2 - height**2, 0)) - 1.5 * self.resolution, 0)
+        if not self.closed:
+            return np.hypot(height, beside)
+        return np.where(height < -0.3 * gap, 0.0, np.hypot(np.maximum(height, 0), beside))
+
+    def room(
+        self,
+        centers: NDArray[np.float64],
+        axes: NDArray[np.float64],
+        reaches: NDArray[np.float64],
+        allowed: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """Largest share of each reach at which neither end stands farther in the air than allowed, at least 0.1."""
+        lengths = 0.1 * reaches
+        open_ = np.arange(len(centers))
+        for share in (1.0, 0.8, 0.64, 0.5, 0.4, 0.3, 0.2):
+            step = (share * reaches[open_])[:, None] * axes[open_]
+            ends = np.concatenate([centers[open_] - step, centers[open_] + step])
+            fits = self.distances(ends).reshape(2, -1).max(0) <= allowed[open_]
+            lengths[open_[fits]] = share * reaches[open_[fits]]
+            open_ = open_[~fits]
+        return lengths
 
 
-def tilted_frames(
-    axes: NDArray[np.float64], normals: NDArray[np.float64], tilt: float, rng: np.random.Generator
-) -> NDArray[np.float64]:
-    """Frames with columns major axis, minor axis, normal: turned about a random tangent, normal sign random."""
-    hinges = random_tangents(normals, rng)
+def tilted_normals(normals: NDArray[np.float64], tilt: float, rng: np.random.Generator) -> NDArray[np.float64]:
+    """Normals off by a median of ``tilt`` degrees in random directions, their sign random."""
     # The angle of a two-dimensional Gaussian tilt is Rayleigh: median 1.177 sigma.
-    angles = np.radians(tilt) / 1.177 * np.sqrt(-2 * np.log(1 - rng.random(len(normals))))
+    angles = np.radians(tilt) / 1.177 * np.sqrt(-2 * np.log(1 - rng.random(len(normals))))[:, None]
     sign = np.where(rng.random(len(normals)) < 0.5, -1.0, 1.0)[:, None]
-    cosine, sine = np.cos(angles)[:, None], np.sin(angles)[:, None]
-
-    def turned(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-        along = (hinges * vectors).sum(1, keepdims=True)
-        return cosine * vectors + sine * np.cross(hinges, vectors) + (1 - cosine) * along * hinges
-
-    first, third = turned(axes), sign * turned(normals)
-    return np.stack([first, np.cross(third, first), third], 2)
+    return sign * (np.cos(angles) * normals + np.sin(angles) * random_tangents(normals, rng))

@@ -86,7 +86,7 @@ def laplacians(scene: Scene, options: argparse.Namespace) -> Iterator[tuple[dict
         figures = graph_figures(scene, graph)
         triangles = local_triangulations(scene.ellipses, geodesic_neighbors(graph, 30))
         for method in options.laplacians:
-            L, _ = point_cloud_laplacian(scene.ellipses.centers, triangles, method=method)
+            L, _ = point_cloud_laplacian(scene.ellipses.centers, triangles, graph=graph, method=method)
             yield {"candidate": rule, "laplacian": method, **figures}, L
     for k in options.knn:
         L, _ = robust_laplacian.point_cloud_laplacian(scene.ellipses.centers, n_neighbors=k)

@@ -1,0 +1,98 @@
+"""What the wheel carries, what the layers may import, and what lies at the top of the tree."""
+
+import ast
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import splap_editor
+from splap_editor.resources import resource
+
+ROOT = Path(__file__).resolve().parent.parent
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+LAYERS = ["__main__", "cli", "app", "ui", "tools", "viewport", "session", "io", "core"]
+
+
+def _modules():
+    return sorted((ROOT / "splap_editor").rglob("*.py"))
+
+
+def test_the_wheel_carries_the_resources_where_the_program_looks_for_them():
+    wheel = PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]
+    assert wheel["packages"] == ["splap_editor"]
+    assert wheel["force-include"] == {"resources": "splap_editor/_resources"}
+
+
+@pytest.mark.parametrize("name", ["bench_2dgs.ply", "windmill_2dgs.ply", "tube.ply", "coil.ply", "README.txt"])
+def test_samples_are_found(name):
+    assert resource("samples", name).stat().st_size > 0
+
+
+def test_every_sample_is_named_with_its_source():
+    readme = resource("samples", "README.txt").read_text(encoding="utf-8")
+    assert "CC0" in readme
+    for sample in resource("samples").glob("*.ply"):
+        assert sample.name in readme
+
+
+def test_a_missing_resource_says_what_to_do():
+    with pytest.raises(FileNotFoundError, match="install SpLap Editor again"):
+        resource("samples", "nothing.ply")
+
+
+def test_the_licence_is_the_one_the_metadata_names():
+    assert PROJECT["project"]["license"] == "GPL-3.0-or-later"
+    assert "GNU GENERAL PUBLIC LICENSE" in (ROOT / "LICENSE").read_text(encoding="utf-8")
+
+
+def test_every_third_party_import_is_a_declared_dependency():
+    def normal(name):
+        return re.split(r"[<>=\[; ]", name)[0].lower().replace("-", "_")
+
+    declared = {normal(name) for name in PROJECT["project"]["dependencies"]}
+    modules = {"igl": "libigl", "PySide6": "pyside6_essentials", "vtkmodules": "vtk"}
+    missing = set()
+    for path in _modules():
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            if isinstance(node, ast.ImportFrom) and node.level == 0:
+                names = [node.module]
+            for name in names:
+                top = name.split(".")[0]
+                known = (
+                    top in sys.stdlib_module_names or top == "splap_editor" or modules.get(top, top).lower() in declared
+                )
+                missing |= set() if known else {f"{path.relative_to(ROOT)}: {top}"}
+    assert not missing
+
+
+def test_the_layer_contract_names_every_layer_from_top_to_bottom():
+    contracts = PROJECT["tool"]["importlinter"]["contracts"]
+    layers = next(contract for contract in contracts if contract["type"] == "layers")
+    named = [name.removeprefix("splap_editor.") for row in layers["layers"] for name in row.split(" | ")]
+    assert [name for name in named if name in LAYERS] == LAYERS
+    assert layers["exhaustive"] is True
+
+
+def test_the_package_itself_imports_nothing_that_takes_time():
+    tree = ast.parse(Path(splap_editor.__file__).read_text(encoding="utf-8"))
+    imports = [ast.unparse(node) for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)]
+    assert imports == ["import os"]
+
+
+def test_nothing_but_the_agreed_names_lies_at_the_top():
+    if not (ROOT / ".git").exists():
+        pytest.skip("a source archive has no list of tracked files")
+    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    top = {line.split("/")[0] for line in listed.splitlines()}
+    allowed = {"pyproject.toml", "splap_editor", "resources", "tests", "README.md", "LICENSE"}
+    assert not {name for name in top - allowed if not name.startswith(".")}
+
+
+def test_no_module_is_longer_than_can_be_read_at_once():
+    long = {str(path.relative_to(ROOT)): len(path.read_text(encoding="utf-8").splitlines()) for path in _modules()}
+    assert not {path: length for path, length in long.items() if length > 400}
