@@ -5,6 +5,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from splap_editor.core.rotation_fit import rotation_quaternion, write_rotation
 from splap_editor.core.rotations import matrices_to_quats
 
 
@@ -29,14 +30,11 @@ def blended_linear(
     -------
     positions : (n, 3) float64
     rotations : (n, 3, 3) float64
-        Rotation nearest to the mean linear map. Where that map has collapsed or turned inside out, as at a joint
-        twisted by half a turn, the rotation of `blended_dual_quaternion` stands in for it.
+        Proper rotation nearest to the mean linear map, one of the equally near ones where that map has collapsed, as at
+        a joint twisted by half a turn.
     """
-    A = transforms[:, :3, :3] - np.eye(3)
-    quats, _, _ = _rigid_and_stretch(transforms)
-    return _linear(
-        np.ascontiguousarray(rest), *_rows(weights), np.ascontiguousarray(A), transforms[:, :3, 3].copy(), quats
-    )
+    displacements = np.ascontiguousarray(transforms[:, :3] - np.eye(3, 4))
+    return _linear(np.ascontiguousarray(rest), *_rows(weights), displacements)
 
 
 def blended_dual_quaternion(
@@ -83,13 +81,17 @@ def blended_dual_quaternion(
     # Roundoff of the polar factor is no stretch.
     excess[np.abs(excess).max(axis=(1, 2), initial=0.0) < 1e-12] = 0.0
     offsets = -np.einsum("hij,hj->hi", excess, centers)
+    # Where no two quaternions point apart, signs need no care; rest agrees with all of them, which have w ≥ 0.
+    agree = bool((quats @ quats.T >= 0).all())
+    rest = np.ascontiguousarray(rest)
     return _dual_quaternion(
-        np.ascontiguousarray(rest), *_rows(weights), quats, duals, excess, offsets, bool(excess.any())
+        rest, *_rows(weights), np.hstack([quats, duals]), agree, excess, offsets, bool(excess.any())
     )
 
 
 def _rows(weights):
-    return weights.indptr.astype(np.int64), weights.indices.astype(np.int32), weights.data.astype(np.float64)
+    indptr, indices = weights.indptr.astype(np.int32, copy=False), weights.indices.astype(np.int32, copy=False)
+    return indptr, indices, weights.data.astype(np.float64, copy=False)
 
 
 def _rigid_and_stretch(transforms):
@@ -103,79 +105,75 @@ def _rigid_and_stretch(transforms):
     return np.ascontiguousarray(matrices_to_quats(rotations)), rotations, stretches
 
 
-@nb.njit(nogil=True, cache=True, inline="always")
-def _mean_quat(first, last, handles, values, quats, signs):
-    """Pivot-aligned signs of a row's quaternions (into ``signs``), the mean's real part, and the rest's sign."""
-    total = 0.0
+@nb.njit(nogil=True, cache=True)
+def _aligned_shares(first, last, handles, values, screws, shares):
+    """Weights of a row's handles (into ``shares``), negative for the far one of a quaternion's two signs.
+
+    Signs agree with the quaternion of the largest weight, rest included. Rest keeps its sign: all quaternions have
+    w ≥ 0.
+    """
+    still = 1.0
     pivot = -1
     most = 0.0
     for q in range(first, last):
-        total += values[q]
+        still -= values[q]
         if values[q] > most:
             most = values[q]
             pivot = handles[q]
-    still = max(0.0, 1.0 - total)
-    pw, px, py, pz = 1.0, 0.0, 0.0, 0.0
-    if most >= still:
-        pw, px, py, pz = quats[pivot, 0], quats[pivot, 1], quats[pivot, 2], quats[pivot, 3]
-    still = still if pw >= 0 else -still
-    w, x, y, z = still, 0.0, 0.0, 0.0
     for q in range(first, last):
         h = handles[q]
-        dot = pw * quats[h, 0] + px * quats[h, 1] + py * quats[h, 2] + pz * quats[h, 3]
-        signs[q - first] = values[q] if dot >= 0 else -values[q]
-        w += signs[q - first] * quats[h, 0]
-        x += signs[q - first] * quats[h, 1]
-        y += signs[q - first] * quats[h, 2]
-        z += signs[q - first] * quats[h, 3]
-    length = np.sqrt(w * w + x * x + y * y + z * z)
-    return w / length, x / length, y / length, z / length, length
-
-
-@nb.njit(nogil=True, cache=True, inline="always")
-def _put_rotation(R, w, x, y, z):
-    R[0, 0] = 1 - 2 * (y * y + z * z)
-    R[0, 1] = 2 * (x * y - w * z)
-    R[0, 2] = 2 * (x * z + w * y)
-    R[1, 0] = 2 * (x * y + w * z)
-    R[1, 1] = 1 - 2 * (x * x + z * z)
-    R[1, 2] = 2 * (y * z - w * x)
-    R[2, 0] = 2 * (x * z - w * y)
-    R[2, 1] = 2 * (y * z + w * x)
-    R[2, 2] = 1 - 2 * (x * x + y * y)
+        dot = screws[h, 0]
+        if most >= still:
+            dot *= screws[pivot, 0]
+            dot += screws[pivot, 1] * screws[h, 1] + screws[pivot, 2] * screws[h, 2] + screws[pivot, 3] * screws[h, 3]
+        shares[q - first] = values[q] if dot >= 0 else -values[q]
 
 
 @nb.njit(nogil=True, cache=True)
-def _dual_quaternion(rest, indptr, handles, values, quats, duals, excess, offsets, stretched):
+def _dual_quaternion(rest, indptr, handles, values, screws, agree, excess, offsets, stretched):
     n = rest.shape[0]
     positions = np.empty((n, 3))
     rotations = np.empty((n, 3, 3))
-    signs = np.empty(quats.shape[0])
+    shares = np.empty(screws.shape[0])
     for i in range(n):
         first, last = indptr[i], indptr[i + 1]
-        px, py, pz = rest[i, 0], rest[i, 1], rest[i, 2]
-        R = rotations[i]
+        sx, sy, sz = rest[i, 0], rest[i, 1], rest[i, 2]
         if first == last:
-            positions[i, 0], positions[i, 1], positions[i, 2] = px, py, pz
-            _put_rotation(R, 1.0, 0.0, 0.0, 0.0)
+            positions[i, 0], positions[i, 1], positions[i, 2] = sx, sy, sz
+            write_rotation(rotations, i, 1.0, 0.0, 0.0, 0.0)
             continue
-        w, x, y, z, length = _mean_quat(first, last, handles, values, quats, signs)
+        if not agree:
+            _aligned_shares(first, last, handles, values, screws, shares)
+        still = 1.0
+        w, x, y, z = 0.0, 0.0, 0.0, 0.0
         dw, dx, dy, dz = 0.0, 0.0, 0.0, 0.0
-        sx, sy, sz = px, py, pz
         for q in range(first, last):
-            h = handles[q]
-            s = signs[q - first] / length
-            dw += s * duals[h, 0]
-            dx += s * duals[h, 1]
-            dy += s * duals[h, 2]
-            dz += s * duals[h, 3]
-            if stretched:
+            screw = screws[handles[q]]
+            still -= values[q]
+            s = values[q] if agree else shares[q - first]
+            w += s * screw[0]
+            x += s * screw[1]
+            y += s * screw[2]
+            z += s * screw[3]
+            dw += s * screw[4]
+            dx += s * screw[5]
+            dy += s * screw[6]
+            dz += s * screw[7]
+        if stretched:
+            px, py, pz = sx, sy, sz
+            for q in range(first, last):
                 v = values[q]
+                h = handles[q]
                 E = excess[h]
                 sx += v * (E[0, 0] * px + E[0, 1] * py + E[0, 2] * pz + offsets[h, 0])
                 sy += v * (E[1, 0] * px + E[1, 1] * py + E[1, 2] * pz + offsets[h, 1])
                 sz += v * (E[2, 0] * px + E[2, 1] * py + E[2, 2] * pz + offsets[h, 2])
-        _put_rotation(R, w, x, y, z)
+        w += max(0.0, still)
+        unit = 1.0 / np.sqrt(w * w + x * x + y * y + z * z)
+        w, x, y, z = w * unit, x * unit, y * unit, z * unit
+        dw, dx, dy, dz = dw * unit, dx * unit, dy * unit, dz * unit
+        write_rotation(rotations, i, w, x, y, z)
+        R = rotations[i]
         # Translation: vector part of 2 d q*, q* the conjugate.
         tx = 2 * (-dw * x + dx * w - dy * z + dz * y)
         ty = 2 * (-dw * y + dx * z + dy * w - dz * x)
@@ -187,70 +185,38 @@ def _dual_quaternion(rest, indptr, handles, values, quats, duals, excess, offset
 
 
 @nb.njit(nogil=True, cache=True)
-def _linear(rest, indptr, handles, values, A, t, quats):
+def _linear(rest, indptr, handles, values, displacements):
+    """Positions and rotations; ``displacements`` (H, 3, 4) are the affine maps less the identity."""
     n = rest.shape[0]
     positions = np.empty((n, 3))
     rotations = np.empty((n, 3, 3))
-    signs = np.empty(quats.shape[0])
-    X = np.empty((3, 3))
-    C = np.empty((3, 3))
     for i in range(n):
-        first, last = indptr[i], indptr[i + 1]
-        R = rotations[i]
-        if first == last:
-            for a in range(3):
-                positions[i, a] = rest[i, a]
-            _put_rotation(R, 1.0, 0.0, 0.0, 0.0)
-            continue
-        for a in range(3):
-            moved = 0.0
-            for b in range(3):
-                X[a, b] = 0.0
-            for q in range(first, last):
-                h = handles[q]
-                v = values[q]
-                moved += v * t[h, a]
-                for b in range(3):
-                    X[a, b] += v * A[h, a, b]
-            for b in range(3):
-                moved += X[a, b] * rest[i, b]
-            positions[i, a] = rest[i, a] + moved
-            X[a, a] += 1.0
-        if not _polar(X, C):
-            w, x, y, z, _ = _mean_quat(first, last, handles, values, quats, signs)
-            _put_rotation(R, w, x, y, z)
+        px, py, pz = rest[i, 0], rest[i, 1], rest[i, 2]
+        a00, a01, a02, a10, a11, a12, a20, a21, a22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        tx, ty, tz = 0.0, 0.0, 0.0
+        for q in range(indptr[i], indptr[i + 1]):
+            v = values[q]
+            D = displacements[handles[q]]
+            a00 += v * D[0, 0]
+            a01 += v * D[0, 1]
+            a02 += v * D[0, 2]
+            a10 += v * D[1, 0]
+            a11 += v * D[1, 1]
+            a12 += v * D[1, 2]
+            a20 += v * D[2, 0]
+            a21 += v * D[2, 1]
+            a22 += v * D[2, 2]
+            tx += v * D[0, 3]
+            ty += v * D[1, 3]
+            tz += v * D[2, 3]
+        positions[i, 0] = px + (a00 * px + a01 * py + a02 * pz + tx)
+        positions[i, 1] = py + (a10 * px + a11 * py + a12 * pz + ty)
+        positions[i, 2] = pz + (a20 * px + a21 * py + a22 * pz + tz)
+        largest = max(abs(a00), abs(a01), abs(a02), abs(a10), abs(a11), abs(a12), abs(a20), abs(a21), abs(a22))
+        # Nodes at rest and nodes that are only shifted, most of a scene, need no fit.
+        if largest == 0.0:
+            write_rotation(rotations, i, 1.0, 0.0, 0.0, 0.0)
         else:
-            for a in range(3):
-                for b in range(3):
-                    R[a, b] = X[a, b]
+            w, x, y, z = rotation_quaternion(a00 + 1.0, a01, a02, a10, a11 + 1.0, a12, a20, a21, a22 + 1.0)
+            write_rotation(rotations, i, w, x, y, z)
     return positions, rotations
-
-
-@nb.njit(nogil=True, cache=True)
-def _polar(X, C):
-    """Replace a matrix by its nearest rotation with Higham's scaled Newton steps; False if it has none to speak of."""
-    for _ in range(12):
-        norm2 = 0.0
-        cofactor2 = 0.0
-        for a in range(3):
-            b, c = (a + 1) % 3, (a + 2) % 3
-            for d in range(3):
-                e, f = (d + 1) % 3, (d + 2) % 3
-                C[a, d] = X[b, e] * X[c, f] - X[b, f] * X[c, e]
-                norm2 += X[a, d] * X[a, d]
-                cofactor2 += C[a, d] * C[a, d]
-        det = X[0, 0] * C[0, 0] + X[0, 1] * C[0, 1] + X[0, 2] * C[0, 2]
-        # Relative to a cube of the same size; below that the polar factor is noise.
-        if det <= 1e-9 * norm2 * np.sqrt(norm2):
-            return False
-        # X^-T = C / det; γ balances the two terms' Frobenius norms.
-        gamma = np.sqrt(np.sqrt(cofactor2 / norm2) / det)
-        change = 0.0
-        for a in range(3):
-            for d in range(3):
-                new = 0.5 * (gamma * X[a, d] + C[a, d] / (gamma * det))
-                change = max(change, abs(new - X[a, d]))
-                X[a, d] = new
-        if change < 1e-13:
-            return True
-    return True
