@@ -170,6 +170,8 @@ def _info(options: argparse.Namespace) -> int:
 
 
 def _graph(options: argparse.Namespace) -> int:
+    import numpy as np
+
     from splap_editor.core.ellipse_offset import normal_offsets
     from splap_editor.core.occupancy import occupancy_ellipses
     from splap_editor.core.splat_graph import GraphOptions, splat_graph
@@ -190,7 +192,8 @@ def _graph(options: argparse.Namespace) -> int:
         offsets = normal_offsets(ellipses, graph.edges).min(axis=1)
     with report("write"):
         rows = ellipses.rows[graph.edges]
-        lengths = graph.edge_lengths
+        means = np.asarray(file.splats.means, np.float64)
+        lengths = np.linalg.norm(means[rows[:, 0]] - means[rows[:, 1]], axis=1)
         write_edges_ply(options.output, file.splats.means, rows, offsets, lengths)
     info = graph_info(graph)
     print(json.dumps(info)) if options.json else report.say(_readable(info))

@@ -1,4 +1,4 @@
-"""The one worker thread: jobs with progress and cancel, results delivered on the main thread."""
+"""Worker threads: jobs with progress and cancel, results delivered on the main thread."""
 
 import threading
 import traceback
@@ -77,17 +77,19 @@ class Job:
 class Worker:
     """A single background thread that runs jobs one after another.
 
-    One thread, since numba's portable threading layer aborts the process when
-    two Python threads enter parallel kernels. Results, failures and
-    progress reach the main thread through ``post``, in order.
+    Compiled loops of the engine are serial and let go of Python's lock, so
+    two workers may run side by side. Results, failures and progress reach
+    the main thread through ``post``, in order.
 
     Parameters
     ----------
     post : callable
         Runs a callable on the main thread.
+    name : str
+        Name of the thread.
     """
 
-    def __init__(self, post: Post) -> None:
+    def __init__(self, post: Post, *, name: str = "splap-worker") -> None:
         self.post = post
         self.on_progress: Callable[[Job], None] = lambda job: None
         self.on_busy: Callable[[Job | None], None] = lambda job: None
@@ -95,7 +97,7 @@ class Worker:
         self._running: Job | None = None
         self._closing = False
         self._wake = threading.Condition()
-        self._thread = threading.Thread(target=self._run, name="splap-worker", daemon=True)
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
     def submit(self, job: Job, *, cancels: tuple[str, ...] = ()) -> Job:

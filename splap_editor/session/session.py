@@ -58,6 +58,8 @@ class Session:
         self.scene: Scene | None = None
         self.history = History()
         self.worker = Worker(post)
+        # Sorting and colouring for a turned view must not wait behind a scene that is being prepared.
+        self.view_worker = Worker(post, name="splap-view")
         self.worker.on_progress = lambda job: self.job_changed.emit(job)
         self.worker.on_busy = lambda job: self.job_changed.emit(job)
         self.cache = cache
@@ -187,8 +189,9 @@ class Session:
         self._advance()
 
     def close(self) -> None:
-        """Cancel everything and join the worker."""
+        """Cancel everything and join the workers."""
         self.worker.close()
+        self.view_worker.close()
 
     @property
     def bound(self) -> BoundEdit | None:
