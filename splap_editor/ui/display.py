@@ -1,11 +1,23 @@
 """How the scene is shown: one value that panel, menu and keys change and the viewport follows."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from PySide6.QtCore import QSettings
 
 from splap_editor.session.signals import Signal
+from splap_editor.viewport.scene_view import SceneView
+from splap_editor.viewport.splat_actor import DisplayMode
+from splap_editor.viewport.viewport import BACKGROUND, DEFAULT_LOOKS, Compare
+
+MODES = {"ellipses": DisplayMode.ELLIPSES, "splats": DisplayMode.SPLATS, "points": DisplayMode.POINTS}
+BACKGROUNDS = {
+    "dark": BACKGROUND,
+    "grey": ((0.27, 0.27, 0.28), (0.36, 0.36, 0.37)),
+    "light": ((0.80, 0.81, 0.82), (0.93, 0.93, 0.94)),
+    "black": ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
+}
+"""Bottom and top of the gradient behind the scene."""
 
 
 @dataclass(frozen=True)
@@ -15,58 +27,59 @@ class DisplayOptions:
     Parameters
     ----------
     mode : str
-        ``"ellipses"``, ``"splats"`` or ``"points"``.
+        Key of `MODES`.
     shown : str
         ``"deformed"``, ``"original"`` or ``"both"``.
-    size_factor : float
-        1 draws splats at their true size.
-    opacity_cut : float
-        Fainter splats are not drawn.
+    size_factor, opacity_cut : float
+        Of the mode shown: 1 draws splats at their true size; fainter splats are not drawn.
     backface : float
         Share of the tint on ellipses seen from behind.
     background : str
-        ``"dark"``, ``"grey"``, ``"light"`` or ``"black"``.
+        Key of `BACKGROUNDS`.
+    tints : bool
+        Handles in their colours, and what stays fixed darker.
     """
 
-    mode: str = "ellipses"
+    mode: str = "splats"
     shown: str = "deformed"
     size_factor: float = 1.0
     opacity_cut: float = 0.0
     backface: float = 0.0
     background: str = "dark"
+    tints: bool = True
 
 
-BACKGROUNDS = {
-    "dark": (0.118, 0.122, 0.133),
-    "grey": (0.32, 0.33, 0.34),
-    "light": (0.86, 0.87, 0.88),
-    "black": (0.0, 0.0, 0.0),
-}
-"""Display colours as sRGB shares."""
+KEPT = ("mode", "backface", "background", "tints")
+"""Options remembered between runs."""
 
 
 class Display:
-    """The options in force, remembered between runs (all but what is shown)."""
+    """The options in force; each mode keeps its own size and opacity cut."""
 
     def __init__(self) -> None:
         self.changed = Signal()
-        settings = QSettings()
-        default = DisplayOptions()
+        settings, default = QSettings(), DisplayOptions()
         kept = {}
-        for field in fields(DisplayOptions):
-            held = getattr(default, field.name)
-            if field.name != "shown":
-                kept[field.name] = settings.value(f"display/{field.name}", held, type=type(held))
-        self.options = replace(default, **kept)
+        for name in KEPT:
+            held = getattr(default, name)
+            kept[name] = settings.value(f"display/{name}", held, type=type(held))
+        if kept["mode"] not in MODES:
+            kept["mode"] = default.mode
+        if kept["background"] not in BACKGROUNDS:
+            kept["background"] = default.background
+        self._sizes = {name: (DEFAULT_LOOKS[m].size_factor, DEFAULT_LOOKS[m].opacity_cut) for name, m in MODES.items()}
+        size_factor, opacity_cut = self._sizes[kept["mode"]]
+        self.options = replace(default, size_factor=size_factor, opacity_cut=opacity_cut, **kept)
         self._held: str | None = None
 
     def set(self, **values: Any) -> None:
-        """Change some options."""
-        self.set_options(replace(self.options, **values))
-
-    def set_options(self, options: DisplayOptions) -> None:
-        """Replace all options."""
-        if options != self.options:
+        """Change some options; a change of mode brings that mode's size and cut."""
+        before = self.options
+        if values.get("mode", before.mode) != before.mode:
+            self._sizes[before.mode] = (before.size_factor, before.opacity_cut)
+            values["size_factor"], values["opacity_cut"] = self._sizes[values["mode"]]
+        options = replace(before, **values)
+        if options != before:
             self.options = options
             self.changed.emit()
 
@@ -79,9 +92,24 @@ class Display:
             shown, self._held = self._held, None
             self.set(shown=shown)
 
+    def apply(self, view: SceneView) -> None:
+        """Make a view look like this."""
+        options = self.options
+        mode = MODES[options.mode]
+        look = DEFAULT_LOOKS[mode]
+        view.look = replace(
+            look,
+            size_factor=options.size_factor,
+            opacity_cut=options.opacity_cut,
+            backface_tint=(*look.backface_tint[:3], options.backface),
+        )
+        view.compare = Compare(options.shown)
+        view.set_background(*BACKGROUNDS[options.background])
+        if view.shows_tints != options.tints:
+            view.shows_tints = options.tints
+
     def save(self) -> None:
         """Remember the options for the next run."""
         settings = QSettings()
-        for field in fields(DisplayOptions):
-            if field.name != "shown":
-                settings.setValue(f"display/{field.name}", getattr(self.options, field.name))
+        for name in KEPT:
+            settings.setValue(f"display/{name}", getattr(self.options, name))

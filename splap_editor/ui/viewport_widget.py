@@ -8,7 +8,7 @@ from time import perf_counter
 os.environ.setdefault("QT_API", "pyside6")
 
 from PySide6.QtCore import QEvent, Qt, Signal
-from PySide6.QtGui import QKeyEvent, QMouseEvent, QNativeGestureEvent, QWheelEvent
+from PySide6.QtGui import QKeyEvent, QMouseEvent, QNativeGestureEvent, QSurfaceFormat, QWheelEvent
 from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QLineEdit, QWidget
 from pyvistaqt import QtInteractor
 
@@ -222,6 +222,19 @@ class ViewportWidget(QtInteractor):
                 pressed=pressed,
             )
         )
+
+
+def surface_format() -> QSurfaceFormat:
+    """What the window asks of OpenGL; to be set before the application is made."""
+    wanted = QSurfaceFormat()
+    wanted.setRenderableType(QSurfaceFormat.RenderableType.OpenGL)
+    wanted.setProfile(QSurfaceFormat.OpenGLContextProfile.CoreProfile)
+    wanted.setVersion(3, 2)
+    wanted.setSwapBehavior(QSurfaceFormat.SwapBehavior.DoubleBuffer)
+    wanted.setAlphaBufferSize(8)
+    wanted.setDepthBufferSize(8)
+    wanted.setSamples(0)
+    return wanted
 
 
 def _key_name(event: QKeyEvent) -> str:

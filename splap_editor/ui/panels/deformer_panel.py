@@ -125,10 +125,9 @@ class DeformerPanel(QWidget):
         session.state_changed.connect(self.show_state)
         self._show()
 
-    def show_timing(self, draw_ms: float, updates_per_s: float | None) -> None:
-        """Show how long a frame takes to draw, and updates a second while something moves."""
-        moving = f" · {updates_per_s:.0f} updates/s" if updates_per_s else ""
-        self.timing.setText(f"Drawn in {draw_ms:.0f} ms{moving}")
+    def show_timing(self, draw_ms: float) -> None:
+        """Show how long the last frame took to draw."""
+        self.timing.setText(f"A frame takes {draw_ms:.0f} ms")
 
     def show_state(self) -> None:
         """Say what the solver does."""

@@ -19,6 +19,7 @@ HINTS = {
     "background": FieldHint(
         "Background", choices={"dark": "Dark", "grey": "Middle grey", "light": "Light", "black": "Black"}
     ),
+    "tints": FieldHint("Show what is free and what is fixed", "Handles in their colours; what stays put is darker."),
 }
 
 
@@ -54,7 +55,7 @@ class DisplayPanel(QWidget):
             self.sliders[name], self.fields[name] = slider, field
         layout.addLayout(grid)
         self.form = OptionsForm(display.options, HINTS)
-        self.form.changed.connect(lambda options: display.set(background=options.background))
+        self.form.changed.connect(lambda options: display.set(background=options.background, tints=options.tints))
         layout.addWidget(self.form)
         display.changed.connect(self._show)
         self._show()

@@ -1,0 +1,100 @@
+"""The composition root: every part of the window is made and wired here."""
+
+import os
+import sys
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+
+os.environ.setdefault("QT_API", "pyside6")
+
+from PySide6.QtCore import QCoreApplication, QObject, Qt, QTimer, Signal
+from PySide6.QtGui import QSurfaceFormat
+from PySide6.QtWidgets import QApplication
+
+from splap_editor.session.cache import StageCache
+from splap_editor.session.session import Session
+from splap_editor.tools.handle_tool import HandleTool
+from splap_editor.tools.navigate_tool import NavigateTool
+from splap_editor.tools.select_tool import SelectTool
+from splap_editor.tools.tool import ToolContext, ToolManager
+from splap_editor.tools.transform_tool import TransformTool
+from splap_editor.ui.display import Display
+from splap_editor.ui.file_commands import sample_path
+from splap_editor.ui.main_window import MainWindow
+from splap_editor.ui.theme import apply_theme
+from splap_editor.ui.viewport_widget import ViewportWidget, surface_format
+from splap_editor.viewport.scene_view import SceneView
+
+
+class Mailbox(QObject):
+    """Runs callables on the thread it was made on, in the order they were posted from any thread."""
+
+    _posted = Signal(object)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._posted.connect(self._run, Qt.ConnectionType.QueuedConnection)
+
+    def post(self, call: Callable[[], None]) -> None:
+        """Run a callable on the mailbox's thread, soon."""
+        self._posted.emit(call)
+
+    @staticmethod
+    def _run(call: Callable[[], None]) -> None:
+        call()
+
+
+def run(path: Path | None = None) -> int:
+    """Open the editor on a file, or on the bundled sample, and stay until it is closed.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
+    QSurfaceFormat.setDefaultFormat(surface_format())
+    app = QApplication.instance() or QApplication(sys.argv[:1])
+    QCoreApplication.setOrganizationName("splap-editor")
+    QCoreApplication.setApplicationName("SpLap Editor")
+    apply_theme(app)
+    window = make_window()
+    sys.excepthook = _shows_in(window)
+    window.show()
+    QTimer.singleShot(0, lambda: window.session.open(path or sample_path()))
+    return app.exec()
+
+
+def make_window(cache: StageCache | None = None) -> MainWindow:
+    """Make the window and everything in it, nothing open yet."""
+    mailbox = Mailbox()
+    session = Session(mailbox.post, cache=cache or StageCache())
+    widget = ViewportWidget()
+    view = SceneView(
+        session, widget.render_window, widget.update, renderer=widget.renderer, scale=widget.devicePixelRatioF()
+    )
+    context = ToolContext(session, view)
+    context.navigate = NavigateTool(context)
+    tools = ToolManager(
+        context,
+        {
+            "handle": HandleTool(context, "handle"),
+            "pin": HandleTool(context, "pin"),
+            "select": SelectTool(context),
+        },
+        (TransformTool(context),),
+        context.navigate,
+    )
+    widget.connect_tools(tools.pointer, tools.key)
+    window = MainWindow(session, widget, view, context, tools, Display())
+    mailbox.setParent(window)
+    return window
+
+
+def _shows_in(window: MainWindow):
+    def hook(kind: type[BaseException], error: BaseException, trace: object) -> None:
+        traceback.print_exception(kind, error, trace)
+        if not issubclass(kind, KeyboardInterrupt):
+            window.toast.fail(f"Something went wrong here: {error}. The edit is kept; undo if the picture looks odd.")
+
+    return hook

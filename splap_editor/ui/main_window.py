@@ -1,0 +1,383 @@
+"""The window: viewport in the middle, tools at the left, panels at the right, one line of state below."""
+
+from pathlib import Path
+
+from PySide6.QtCore import QPoint, QSettings, QSize, Qt
+from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDragLeaveEvent, QDropEvent, QIcon
+from PySide6.QtWidgets import (
+    QDockWidget,
+    QMainWindow,
+    QMenu,
+    QMessageBox,
+    QScrollArea,
+    QSizePolicy,
+    QToolBar,
+    QVBoxLayout,
+    QWidget,
+)
+
+import splap_editor
+from splap_editor.session.scene import Scene
+from splap_editor.session.session import Session
+from splap_editor.tools.select_tool import SelectTool
+from splap_editor.tools.tool import ToolContext, ToolManager
+from splap_editor.ui.action_table import ACTIONS, MENUS
+from splap_editor.ui.actions import ActionSet
+from splap_editor.ui.commands import DisplayCommands, EditCommands, HandleCommands, SelectCommands, ToolCommands
+from splap_editor.ui.display import Display
+from splap_editor.ui.file_commands import FileCommands
+from splap_editor.ui.help_sheet import HelpSheet
+from splap_editor.ui.job_bar import JobBar
+from splap_editor.ui.overlay import Overlay
+from splap_editor.ui.panels.deformer_panel import DeformerPanel
+from splap_editor.ui.panels.display_panel import DisplayPanel
+from splap_editor.ui.panels.handles_panel import HandlesPanel
+from splap_editor.ui.panels.scene_panel import ScenePanel
+from splap_editor.ui.panels.section import Section
+from splap_editor.ui.picture_dialog import PictureDialog
+from splap_editor.ui.state_line import StateLine
+from splap_editor.ui.toast import Toast
+from splap_editor.ui.tool_options import ToolOptionsBar
+from splap_editor.ui.view_commands import ViewCommands
+from splap_editor.ui.viewport_widget import ViewportWidget
+from splap_editor.viewport.scene_view import SceneView
+
+HINT = ("Click the surface to place a handle.", "Drag the arrows.")
+TOOL_COLUMN = ("tool.select", "tool.lasso", "tool.brush", "", "tool.handle", "tool.pin")
+CONTEXT_MENU = (
+    "handle.from_selection",
+    "handle.pin_selection",
+    "",
+    "handle.reset",
+    "handle.delete",
+    "",
+    "select.hide",
+    "select.isolate",
+    "select.show_all",
+    "",
+    "view.frame_selection",
+    "view.frame_all",
+)
+LAYOUT_VERSION = 1
+
+
+class MainWindow(QMainWindow):
+    """Puts the parts together; what they do is in the commands, what is true in the session.
+
+    Parameters
+    ----------
+    session : Session
+    viewport : ViewportWidget
+    view : SceneView
+        What ``viewport`` shows.
+    context : ToolContext
+    tools : ToolManager
+    display : Display
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        viewport: ViewportWidget,
+        view: SceneView,
+        context: ToolContext,
+        tools: ToolManager,
+        display: Display,
+    ) -> None:
+        super().__init__()
+        self.setObjectName("main")
+        self.setMinimumSize(900, 600)
+        self.setAcceptDrops(True)
+        self.session, self.viewport, self.view, self.tools, self.display = session, viewport, view, tools, display
+        self._may_close = False
+        self._has_hinted = QSettings().value("hint/done", False, type=bool)
+        self.overlay = Overlay(context.hud, viewport)
+        self.toast = Toast(viewport)
+        self.dock = QDockWidget()
+        self.dock.setObjectName("panels")
+        self.actions_ = self._actions()
+        self._add_menus()
+        self._add_tool_column()
+        self._add_centre()
+        self._add_panels()
+        self.job_bar = JobBar(session)
+        self.state_line = StateLine(session, tools)
+        self.statusBar().setSizeGripEnabled(False)
+        self.statusBar().addWidget(self.job_bar, 1)
+        self.statusBar().addPermanentWidget(self.state_line)
+        viewport.resized.connect(self._on_viewport_resized)
+        viewport.compare_held.connect(display.hold_original)
+        viewport.menu_wanted.connect(self._on_menu_wanted)
+        viewport.frame_drawn.connect(self.deformer_panel.show_timing)
+        session.scene_changed.connect(self._on_scene_changed)
+        session.history.changed.connect(self._refresh)
+        session.state_changed.connect(self._refresh)
+        session.exported.connect(lambda report: self._refresh())
+        session.job_changed.connect(lambda job: self._refresh())
+        tools.chosen_changed.connect(self._show_tool)
+        display.changed.connect(self._show_display)
+        self._show_tool()
+        self._show_display()
+        self._restore()
+        self._refresh()
+
+    # ---------------------------------------------------------------- parts
+
+    def _actions(self) -> ActionSet:
+        session, view, tools = self.session, self.view, self.tools
+        select_tool = next(tool for tool in tools.tools.values() if isinstance(tool, SelectTool))
+        self.files = FileCommands(self, session, self.toast)
+        return ActionSet(
+            self,
+            {
+                "file": self.files,
+                "edit": EditCommands(session, tools),
+                "select": SelectCommands(session, select_tool),
+                "handle": HandleCommands(session, view),
+                "display": DisplayCommands(self.display),
+                "view": ViewCommands(session, view, self, self.dock),
+                "tool": ToolCommands(tools, select_tool),
+                "help": self,
+            },
+            self._is_met,
+        )
+
+    def _add_menus(self) -> None:
+        menus: dict[str, QMenu] = {title: self.menuBar().addMenu(title) for title in MENUS}
+        for spec in ACTIONS:
+            if not spec.menu:
+                continue
+            if spec.menu not in menus:
+                parent, _, title = spec.menu.rpartition("/")
+                if spec.breaks:
+                    menus[parent].addSeparator()
+                menus[spec.menu] = menus[parent].addMenu(title)
+            elif spec.breaks:
+                menus[spec.menu].addSeparator()
+            menus[spec.menu].addAction(self.actions_[spec.action_id])
+
+    def _add_tool_column(self) -> None:
+        column = QToolBar("Tools")
+        column.setObjectName("toolColumn")
+        column.setMovable(False)
+        column.setIconSize(QSize(22, 22))
+        column.toggleViewAction().setVisible(False)
+        for action_id in TOOL_COLUMN:
+            if action_id:
+                column.addAction(self.actions_[action_id])
+            else:
+                column.addSeparator()
+        space = QWidget()
+        space.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Expanding)
+        column.addWidget(space)
+        for action_id in ("file.open", "file.export", "help.sheet"):
+            column.addAction(self.actions_[action_id])
+        self.addToolBar(Qt.ToolBarArea.LeftToolBarArea, column)
+
+    def _add_centre(self) -> None:
+        centre = QWidget()
+        layout = QVBoxLayout(centre)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(0)
+        layout.addWidget(ToolOptionsBar(self.tools, self.actions_))
+        layout.addWidget(self.viewport, 1)
+        self.setCentralWidget(centre)
+
+    def _add_panels(self) -> None:
+        self.handles_panel = HandlesPanel(self.session)
+        self.deformer_panel = DeformerPanel(self.session)
+        self.display_panel = DisplayPanel(self.display, self.actions_)
+        self.scene_panel = ScenePanel(self.session)
+        page = QWidget()
+        stack = QVBoxLayout(page)
+        stack.setContentsMargins(0, 0, 0, 0)
+        stack.setSpacing(0)
+        for title, panel in (
+            ("Handles", self.handles_panel),
+            ("Deformer", self.deformer_panel),
+            ("Display", self.display_panel),
+            ("Scene", self.scene_panel),
+        ):
+            stack.addWidget(Section(title, panel))
+        stack.addStretch(1)
+        scroll = QScrollArea(widgetResizable=True)
+        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        scroll.setMinimumWidth(272)
+        scroll.setWidget(page)
+        self.dock.setTitleBarWidget(QWidget())
+        self.dock.setFeatures(QDockWidget.DockWidgetFeature.NoDockWidgetFeatures)
+        self.dock.setWidget(scroll)
+        self.dock.toggleViewAction().setVisible(False)
+        self.addDockWidget(Qt.DockWidgetArea.RightDockWidgetArea, self.dock)
+        self.resizeDocks([self.dock], [304], Qt.Orientation.Horizontal)
+
+    # ---------------------------------------------------------------- state
+
+    def _is_met(self, condition: str) -> bool:
+        session, scene = self.session, self.session.scene
+        if condition in ("undo", "redo"):
+            return getattr(session.history, f"can_{condition}")
+        if condition == "busy":
+            return session.worker.is_busy("open", "prepare", "bind", "pose", "export")
+        if condition == "halted":
+            return session.state in ("halted", "failed")
+        return scene is not None and _scene_meets(scene, condition)
+
+    def _refresh(self) -> None:
+        history = self.session.history
+        for name in ("undo", "redo"):
+            label = getattr(history, f"{name}_label")
+            self.actions_[f"edit.{name}"].setText(f"&{name.title()} {label.lower()}".rstrip())
+        self.actions_.refresh()
+        scene = self.session.scene
+        self.setWindowTitle(f"{scene.file.path.name}[*] – SpLap Editor" if scene is not None else "SpLap Editor")
+        self.setWindowModified(self.session.has_unexported_edit)
+
+    def _show_tool(self) -> None:
+        chosen = self.tools.chosen
+        name = chosen.name
+        if isinstance(chosen, SelectTool):
+            name = {"lasso": "lasso", "brush": "brush"}.get(chosen.options.shape, "select")
+        self.actions_.check(f"tool.{name}")
+        self.viewport.setCursor(Qt.CursorShape.CrossCursor if name != "navigate" else Qt.CursorShape.ArrowCursor)
+
+    def _show_display(self) -> None:
+        options = self.display.options
+        self.actions_.check(f"display.{options.mode}")
+        self.actions_.check(f"display.{options.shown}")
+        self.display.apply(self.view)
+
+    def _on_scene_changed(self) -> None:
+        scene = self.session.scene
+        scene.selection_changed.connect(self._refresh)
+        scene.hidden_changed.connect(self._refresh)
+        scene.active_handles_changed.connect(self._refresh)
+        scene.surface_changed.connect(self._refresh)
+        scene.edit_changed.connect(self._on_edit_changed)
+        self.display.apply(self.view)
+        self.overlay.show_hint(*(() if self._has_hinted else HINT))
+        self._refresh()
+
+    def _on_edit_changed(self) -> None:
+        edit = self.session.scene.edit
+        if edit.handles and self.overlay.hint == HINT:
+            self.overlay.show_hint(HINT[1])
+        if edit.handles and not edit.is_identity:
+            self._has_hinted = True
+            self.overlay.show_hint()
+        self._refresh()
+
+    def _on_viewport_resized(self) -> None:
+        self.overlay.setGeometry(self.viewport.rect())
+        self.view.set_scale(self.viewport.devicePixelRatioF())
+
+    def _on_menu_wanted(self, position: QPoint) -> None:
+        menu = QMenu(self)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        for action_id in CONTEXT_MENU:
+            if not action_id:
+                menu.addSeparator()
+            elif self.actions_[action_id].isEnabled():
+                menu.addAction(self.actions_[action_id])
+        menu.popup(position)
+
+    # ---------------------------------------------------------------- help and pictures
+
+    def sheet(self) -> None:
+        """Show every key and gesture."""
+        HelpSheet(self).open()
+
+    def about(self) -> None:
+        """Say what this is."""
+        box = QMessageBox(
+            QMessageBox.Icon.NoIcon, "About SpLap Editor", f"SpLap Editor {splap_editor.__version__}", parent=self
+        )
+        box.setInformativeText(
+            "Bends, poses and reshapes captured Gaussian splats with surface-aware Laplacians, "
+            "after “SpLap” (3DV 2026).\n\nFree software: GNU GPL 3 or later."
+        )
+        box.setIconPixmap(QIcon(self.windowIcon()).pixmap(64, 64))
+        box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        box.open()
+
+    def show_picture_dialog(self) -> None:
+        """Ask for a size and write the view as a PNG."""
+        PictureDialog(self, self.view, self.session.scene.file.path, self.toast).open()
+
+    # ---------------------------------------------------------------- dropped files
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
+        """Frame the picture when the file is one that opens."""
+        path = _dropped_path(event)
+        if path is not None:
+            event.acceptProposedAction()
+            what = "edit" if path.suffix.lower() == ".json" else "capture"
+            self.overlay.show_drop(f"Drop to open the {what} {path.name}")
+
+    def dragLeaveEvent(self, event: QDragLeaveEvent) -> None:
+        """Take the frame away."""
+        self.overlay.show_drop("")
+
+    def dropEvent(self, event: QDropEvent) -> None:
+        """Open the file."""
+        self.overlay.show_drop("")
+        path = _dropped_path(event)
+        if path is not None:
+            event.acceptProposedAction()
+            self.files.open_path(path)
+
+    # ---------------------------------------------------------------- leaving
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        """Ask about an edit that would be lost; then stop the work and free the picture."""
+        if not self._may_close and self.session.has_unexported_edit:
+            event.ignore()
+            self.files.leave_edit(self._close_for_good)
+            return
+        settings = QSettings()
+        settings.setValue("window/geometry", self.saveGeometry())
+        settings.setValue("window/layout", self.saveState(LAYOUT_VERSION))
+        settings.setValue("hint/done", self._has_hinted)
+        self.display.save()
+        self.tools.cancel()
+        self.session.close()
+        self.view.close()
+        self.viewport.close()
+        event.accept()
+
+    def _close_for_good(self) -> None:
+        self._may_close = True
+        self.close()
+
+    def _restore(self) -> None:
+        settings = QSettings()
+        geometry, layout = settings.value("window/geometry"), settings.value("window/layout")
+        if geometry is None or not self.restoreGeometry(geometry):
+            self.resize(1440, 900)
+        if layout is not None:
+            self.restoreState(layout, LAYOUT_VERSION)
+        self.actions_.check("view.panels", not self.dock.isHidden())
+        self.actions_.check("view.turntable", self.view.camera.is_turntable)
+
+
+def _scene_meets(scene: Scene, condition: str) -> bool:
+    if condition == "scene":
+        return True
+    if condition == "selection":
+        return bool(scene.selection.any())
+    if condition == "surface_selection":
+        return scene.surface is not None and bool(scene.selection.any())
+    if condition == "hidden":
+        return bool(scene.hidden.any())
+    if condition == "handles":
+        return bool(scene.edit.handles)
+    if condition == "pins":
+        return bool(scene.edit.pins)
+    if condition == "active_handles":
+        return bool(scene.active_handles)
+    raise ValueError(f"unknown condition {condition!r}")
+
+
+def _dropped_path(event: QDropEvent) -> Path | None:
+    paths = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
+    return next((path for path in paths if path.suffix.lower() in (".ply", ".json")), None)

@@ -1,0 +1,51 @@
+"""The right end of the status bar: hint of the tool, counts."""
+
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
+
+from splap_editor.session.session import Session
+from splap_editor.tools.tool import ToolManager
+from splap_editor.ui.theme import STEP
+
+
+class StateLine(QWidget):
+    """Says what the chosen tool does, and how many splats there are, selected and hidden."""
+
+    def __init__(self, session: Session, tools: ToolManager, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._session = session
+        self._tools = tools
+        self.hint = QLabel()
+        self.hint.setProperty("tone", "quiet")
+        self.counts = QLabel()
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(2 * STEP, STEP, 3 * STEP, STEP)
+        layout.setSpacing(6 * STEP)
+        layout.addWidget(self.hint)
+        layout.addWidget(self.counts)
+        session.scene_changed.connect(self._on_scene_changed)
+        tools.chosen_changed.connect(self.show_hint)
+        self.show_hint()
+
+    def show_hint(self) -> None:
+        """Show the chosen tool's hint."""
+        self.hint.setText(self._tools.chosen.hint)
+
+    def _on_scene_changed(self) -> None:
+        scene = self._session.scene
+        if scene is not None:
+            scene.selection_changed.connect(self._show_counts)
+            scene.hidden_changed.connect(self._show_counts)
+        self._show_counts()
+
+    def _show_counts(self) -> None:
+        scene = self._session.scene
+        if scene is None:
+            self.counts.setText("")
+            return
+        words = [f"{scene.splats.n_splats:,} splats"]
+        n_selected, n_hidden = int(scene.selection.sum()), int(scene.hidden.sum())
+        if n_selected:
+            words.insert(0, f"{n_selected:,} selected of")
+        if n_hidden:
+            words.append(f"· {n_hidden:,} hidden")
+        self.counts.setText(" ".join(words))

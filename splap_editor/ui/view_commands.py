@@ -1,0 +1,111 @@
+"""What the View menu does: the camera and the window."""
+
+import numpy as np
+from PySide6.QtCore import QObject, QVariantAnimation
+from PySide6.QtWidgets import QWidget
+
+from splap_editor.session.session import Session
+from splap_editor.viewport.camera import View, blended
+from splap_editor.viewport.scene_view import SceneView
+
+FLIGHT_MS = 220
+
+
+class ViewCommands(QObject):
+    """Flies the camera, shows and hides parts of the window.
+
+    Parameters
+    ----------
+    window : QWidget
+        Goes full screen.
+    dock : QWidget
+        The panels.
+    """
+
+    def __init__(self, session: Session, view: SceneView, window: QWidget, dock: QWidget) -> None:
+        super().__init__(window)
+        self._session = session
+        self._view = view
+        self._window = window
+        self._dock = dock
+        self._flight = QVariantAnimation(self, duration=FLIGHT_MS, startValue=0.0, endValue=1.0)
+        self._flight.valueChanged.connect(self._on_flown)
+        self._flight.finished.connect(view.end_motion)
+        self._ends: tuple[View, View] | None = None
+
+    def fly_to(self, end: View) -> None:
+        """Move the camera there, quickly enough not to wait for."""
+        if self._flight.state() == QVariantAnimation.State.Running:
+            self._flight.stop()
+            self._view.end_motion()
+        self._ends = (self._view.camera.view, end)
+        self._view.begin_motion()
+        self._flight.start()
+
+    def _on_flown(self, share: float) -> None:
+        start, end = self._ends
+        # Slow at the end: the eye finds its place again.
+        self._view.camera.view = blended(start, end, 1.0 - (1.0 - share) ** 3)
+        self._view.camera_moved()
+
+    def frame_selection(self) -> None:
+        """Fly to the selection, else to the chosen handles, else to everything."""
+        scene = self._session.scene
+        rows = np.flatnonzero(scene.selection & ~scene.hidden)
+        if not len(rows):
+            rows = self._view.rows_of_handles(scene.active_handles)
+        if len(rows):
+            self.fly_to(self._view.camera.frame(np.asarray(scene.positions)[rows]))
+        else:
+            self.frame_all()
+
+    def frame_all(self) -> None:
+        """Fly to where everything is in view."""
+        self.fly_to(self._view.camera.frame(self._view.core_points()))
+
+    def front(self) -> None:
+        """Look along +Y."""
+        self._look_from((0.0, -1.0, 0.0))
+
+    def back(self) -> None:
+        """Look along -Y."""
+        self._look_from((0.0, 1.0, 0.0))
+
+    def right(self) -> None:
+        """Look along -X."""
+        self._look_from((1.0, 0.0, 0.0))
+
+    def left(self) -> None:
+        """Look along +X."""
+        self._look_from((-1.0, 0.0, 0.0))
+
+    def top(self) -> None:
+        """Look along -Z."""
+        self._look_from((0.0, 0.0, 1.0))
+
+    def bottom(self) -> None:
+        """Look along +Z."""
+        self._look_from((0.0, 0.0, -1.0))
+
+    def _look_from(self, axis: tuple[float, float, float]) -> None:
+        self.fly_to(self._view.camera.look_from(axis))
+
+    def orthographic(self, on: bool) -> None:
+        """Drop perspective, or bring it back."""
+        self._view.camera.set_parallel(on)
+        self._view.camera_moved()
+
+    def turntable(self, on: bool) -> None:
+        """Keep the horizon level."""
+        self._view.camera.is_turntable = on
+
+    def panels(self, on: bool) -> None:
+        """Show or hide the panels."""
+        self._dock.setVisible(on)
+
+    def full_screen(self, on: bool) -> None:
+        """Fill the screen."""
+        if on:
+            self._window.showFullScreen()
+        else:
+            self._window.showNormal()
