@@ -116,7 +116,7 @@ def _deform(options: argparse.Namespace) -> int:
         report.end_stage()
         with report("bind"):
             handles = handles_of(surface, edit)
-            deformer = deformer_of(surface, edit, handles, progress=report.progress)
+            deformer = deformer_of(surface, edit, handles, cache=cache, progress=report.progress)
         with report("solve"):
             deformation = deformer.solve(edit.transforms, progress=report.progress)
         with report("adapt"):

@@ -77,7 +77,16 @@ def test_the_same_recipe_twice_gives_the_same_bytes(tmp_path, recipe):
 def test_info_has_the_promised_keys(capsys):
     assert main(["info", str(TUBE), "--graph", "--json"]) == 0
     info = json.loads(capsys.readouterr().out)
-    assert {"n_splats", "layout", "sh_degree", "n_scales", "n_inert", "scene_scale", "flatness", "warnings"} <= info.keys()
+    assert {
+        "n_splats",
+        "layout",
+        "sh_degree",
+        "n_scales",
+        "n_inert",
+        "scene_scale",
+        "flatness",
+        "warnings",
+    } <= info.keys()
     assert info["flatness"].keys() == {"p5", "p50", "p95"}
     assert info["graph"].keys() == {"n_edges", "mean_degree", "n_components", "largest_component"}
     assert {"read", "occupancy", "graph", "geodesics", "laplacian"} <= info["timings_s"].keys()
@@ -136,7 +145,9 @@ def bad_files(folder: Path) -> dict[str, tuple[Path, str]]:
     return files
 
 
-@pytest.mark.parametrize("name", ["not_a_ply", "empty", "truncated", "mesh", "no_splats", "not_finite", "missing", "folder"])
+@pytest.mark.parametrize(
+    "name", ["not_a_ply", "empty", "truncated", "mesh", "no_splats", "not_finite", "missing", "folder"]
+)
 def test_a_bad_file_is_refused_in_one_sentence(name, tmp_path, recipe, capsys):
     path, word = bad_files(tmp_path)[name]
     out = tmp_path / "out.ply"

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from time import perf_counter
 
 import numpy as np
@@ -9,6 +10,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from splap_editor.core.arap import ArapDeformer, ArapOptions
+from splap_editor.core.arap_scene import ArapScene
 from splap_editor.core.deformer import Deformation, Deformer, Handles
 from splap_editor.core.geodesics import Neighborhoods, geodesic_neighbors
 from splap_editor.core.handle_nodes import handle_nodes
@@ -51,6 +53,10 @@ class Surface:
         Lumped areas.
     binding : KernelBinding
         Carriers of every splat's ellipse.
+    options : GraphOptions
+        What the graph was made with.
+    key : str
+        Hash of everything the above was made from.
     timings_s : dict
         Seconds of each stage made, not loaded.
     """
@@ -63,7 +69,13 @@ class Surface:
     M: NDArray[np.float64]
     binding: KernelBinding
     options: GraphOptions
+    key: str
     timings_s: dict[str, float] = field(default_factory=dict)
+
+    @cached_property
+    def arap_scene(self) -> ArapScene:
+        """What all as-rigid-as-possible handle sets of the scene share; its coarse model is made when first dragged."""
+        return ArapScene(self.ellipses.centers, self.L, self.graph)
 
 
 def surface_of(
@@ -118,7 +130,7 @@ def surface_of(
         graph, neighborhoods, triangles, L, M = _unpacked(kept)
     with timed("kernels"):
         binding = KernelBinding(splats, ellipses, neighborhoods, graph=graph, progress=stages("kernels"))
-    return Surface(ellipses, graph, neighborhoods, triangles, L, M, binding, options, timings)
+    return Surface(ellipses, graph, neighborhoods, triangles, L, M, binding, options, key, timings)
 
 
 def handles_of(surface: Surface, edit: Edit) -> Handles:
@@ -140,27 +152,20 @@ def handles_of(surface: Surface, edit: Edit) -> Handles:
     )
 
 
-def deformer_of(surface: Surface, edit: Edit, handles: Handles, *, progress: Progress) -> Deformer:
+def deformer_of(
+    surface: Surface, edit: Edit, handles: Handles, *, cache: StageCache | None = None, progress: Progress
+) -> Deformer:
     """Bind the deformer that an edit names; the one place where deformers are chosen."""
-    ellipses = surface.ellipses
     if edit.method == "bbw":
-        from splap_editor.core.bbw import BbwDeformer, BbwOptions
+        # The quadratic-program solvers are imported only by those who want them.
+        from splap_editor.session.bbw_binding import bbw_deformer
 
-        return BbwDeformer(
-            ellipses.centers,
-            surface.L,
-            surface.M,
-            handles,
-            scene_scale=ellipses.scene_scale,
-            graph=surface.graph,
-            options=BbwOptions(blending=edit.blending),
-            progress=progress,
-        )
+        return bbw_deformer(surface, handles, blending=edit.blending, cache=cache, progress=progress)
     return ArapDeformer(
-        ellipses.centers,
+        surface.ellipses.centers,
         surface.L,
         handles,
-        scene_scale=ellipses.scene_scale,
+        scene_scale=surface.ellipses.scene_scale,
         M=surface.M,
         graph=surface.graph,
         triangles=surface.triangles,
@@ -170,6 +175,7 @@ def deformer_of(surface: Surface, edit: Edit, handles: Handles, *, progress: Pro
             iterations=edit.solver.iterations,
             smoothness=edit.solver.smoothness,
         ),
+        scene=surface.arap_scene,
         progress=progress,
     )
 

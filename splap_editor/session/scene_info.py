@@ -1,11 +1,18 @@
 """Facts about a scene, as ``splap-editor info`` and the scene panel show them."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from splap_editor.core.occupancy import Ellipses, occupancy_ellipses
-from splap_editor.core.splat_graph import SplatGraph
 from splap_editor.core.splats import Splats
 from splap_editor.io.ply import SplatFile
+
+if TYPE_CHECKING:
+    # The graph brings the compiler with it, which `splap-editor info` shall not wait for.
+    from splap_editor.core.splat_graph import SplatGraph
 
 
 def scene_info(file: SplatFile) -> tuple[dict, Ellipses]:

@@ -227,7 +227,10 @@ class Session:
         splats, ellipses, cache = scene.splats, scene.ellipses, self.cache
 
         def prepare(job: Job) -> Surface:
-            return surface_of(splats, options, ellipses=ellipses, cache=cache, stages=job.progress)
+            surface = surface_of(splats, options, ellipses=ellipses, cache=cache, stages=job.progress)
+            job.report(0.0, "coarse model")
+            _ = surface.arap_scene.coarse  # made here, so that the first drag need not wait for it
+            return surface
 
         def done(surface: Surface) -> None:
             if self.scene is scene:
@@ -242,11 +245,12 @@ class Session:
     def _bind(self, scene: Scene, edit: Edit) -> None:
         if self._is_making("bind", lambda wanted: binds_like(wanted, edit)):
             return
-        surface = scene.surface
+        surface, cache = scene.surface, self.cache
 
         def bind(job: Job) -> BoundEdit:
             handles = handles_of(surface, edit)
-            return BoundEdit(edit, handles, deformer_of(surface, edit, handles, progress=job.progress("binding")))
+            progress = job.progress("binding")
+            return BoundEdit(edit, handles, deformer_of(surface, edit, handles, cache=cache, progress=progress))
 
         def done(bound: BoundEdit) -> None:
             if self.scene is scene and scene.surface is surface:
