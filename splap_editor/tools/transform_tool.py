@@ -128,7 +128,7 @@ class TransformTool:
         self._by_key = by_key
         self._typed = ""
         self._has_moved = False
-        viewport.gizmo.begin(part, viewport.projection(), *xy)
+        viewport.gizmo.begin(part, viewport.projection, *xy)
         viewport.begin_motion()
 
     def _move(self, event: PointerEvent) -> None:
@@ -182,7 +182,7 @@ class TransformTool:
         if not handles:
             return False
         centers = np.array([np.asarray(h.region.center) + h.pose.translate for h in handles])
-        pixels = viewport.projection().pixels(centers)
+        pixels = viewport.projection.pixels(centers)
         distances = np.linalg.norm(pixels - np.array(event.xy), axis=1)
         nearest = int(np.argmin(distances))
         if not distances[nearest] <= MARKER_REACH_PX * viewport.gizmo.scale:
