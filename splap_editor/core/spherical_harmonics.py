@@ -186,7 +186,8 @@ def rotated_sh(
     Returns
     -------
     (N, K, 3)
-        Turned coefficients, float32 if ``shN`` is, else float64. Non-finite coefficients stay in their band and channel.
+        Turned coefficients, float32 if ``shN`` is, else float64. A coefficient that is not finite spoils no more than
+        its band and channel.
 
     Raises
     ------

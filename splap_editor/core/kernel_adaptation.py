@@ -1,0 +1,335 @@
+"""Splats whose ellipses keep covering the surface when it is deformed."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from splap_editor.core.carried_ellipses import (
+    STILL_SHARE,
+    KernelArrays,
+    adapt_inert,
+    carry_triangles,
+    find_motions,
+    find_moved,
+    map_rings,
+    write_kernels,
+)
+from splap_editor.core.deformer import Deformation
+from splap_editor.core.kernel_binding import KernelBinding
+from splap_editor.core.rotations import matrices_to_quats, quat_products
+from splap_editor.core.spherical_harmonics import rotated_sh
+from splap_editor.core.splats import Splats
+
+_BLOCK = 8192
+
+AdaptationMethod = Literal["surface", "affine", "none"]
+
+
+@dataclass(frozen=True, eq=False)
+class AdaptedKernels:
+    """Every splat of a file after a deformation, in file order.
+
+    Parameters
+    ----------
+    binding : KernelBinding
+        What was adapted.
+    means : (N, 3) float64
+        Centres in world units.
+    rotations : (N, 3, 3) float64
+        Proper rotation of each splat, rest → deformed: the polar factor of how its ellipse moved. It turns normals and
+        colours; it does not hold the turn of the principal axes within the plane.
+    growths : (N, 2) float64
+        Factor on the effective standard deviation along the axis that was major and the one that was minor at rest.
+    twists : (N, 2) float64
+        Cosine and sine of the turn of the principal axes within the plane, -45° to 45°, before ``rotations``.
+    changed : (N,) bool
+        False where nothing that carries the splat has moved: its row is the file's own, bit for bit.
+    means_f32 : (N, 3) float32
+        ``means`` to draw.
+    axes_f32 : (N, 2, 3) float32
+        In-plane principal axes to draw, world vectors one effective standard deviation long.
+    """
+
+    binding: KernelBinding
+    means: NDArray[np.float64]
+    rotations: NDArray[np.float64]
+    growths: NDArray[np.float64]
+    twists: NDArray[np.float64]
+    changed: NDArray[np.bool_]
+    means_f32: NDArray[np.float32]
+    axes_f32: NDArray[np.float32]
+
+    @property
+    def thicknesses(self) -> NDArray[np.float32]:
+        """(N,) standard deviation across the surface to draw; deformation does not change it."""
+        return self.binding.thicknesses
+
+    @cached_property
+    def quats(self) -> NDArray[np.float64]:
+        """(N, 4) quaternions w, x, y, z of the file's own lengths; unchanged rows hold the file's own numbers."""
+        quats = np.array(self.binding.splats.quats, np.float64)
+        rows = np.flatnonzero(self.changed)
+        turns = matrices_to_quats(self.rotations[rows])
+        quats[rows] = quat_products(quat_products(turns, self._twist_quats(rows)), quats[rows])
+        return quats
+
+    def _twist_quats(self, rows):
+        """(R, 4) turns within the rest plane; the identity for inert splats, which have no plane."""
+        ellipses = self.binding.ellipses
+        nodes = ellipses.node_of_row[rows]
+        normals = np.zeros((len(rows), 3))
+        normals[nodes >= 0] = ellipses.normals[nodes[nodes >= 0]]
+        cosines, sines = self.twists[rows].T
+        half_cosines = np.sqrt(0.5 * (1.0 + cosines))
+        return np.concatenate([half_cosines[:, None], normals * (0.5 * sines / half_cosines)[:, None]], axis=1)
+
+    @cached_property
+    def log_scales(self) -> NDArray[np.float64]:
+        """(N, 2 or 3) stored log-scales; unchanged rows and the axis across the surface hold the file's own numbers.
+
+        With a 3-D filter of radius f the effective variance s² + f² grows, and the filter is taken off again; a
+        variance that would fall below the filter's own is held at 1e-12 of the effective one at rest.
+        """
+        splats, ellipses = self.binding.splats, self.binding.ellipses
+        log_scales = np.array(splats.log_scales, np.float64)
+        nodes = np.flatnonzero(self.changed[ellipses.rows])
+        rows = ellipses.rows[nodes]
+        columns = ellipses.axes[nodes, :2].astype(np.int64)
+        growths = self.growths[rows]
+        stored = log_scales[rows[:, None], columns]
+        if splats.filter_radii is None:
+            log_scales[rows[:, None], columns] = stored + np.log(growths)
+            return log_scales
+        scales2 = np.exp(2.0 * stored)
+        filters2 = np.asarray(splats.filter_radii, np.float64)[rows, None] ** 2
+        variances = growths**2 * scales2 + (growths**2 - 1.0) * filters2
+        with np.errstate(divide="ignore"):
+            log_scales[rows[:, None], columns] = 0.5 * np.log(np.maximum(variances, 1e-12 * (scales2 + filters2)))
+        return log_scales
+
+
+def adapt_kernels(
+    binding: KernelBinding,
+    deformation: Deformation,
+    *,
+    method: AdaptationMethod = "surface",
+    hops: int = 1,
+    out: AdaptedKernels | None = None,
+) -> AdaptedKernels:
+    """Adapt every splat of a scene to a deformation of its nodes.
+
+    "surface" follows the corners of the triangle inscribed in each occupancy ellipse and takes the Steiner
+    circumellipse of the moved triangle [1]_. The paper moves a corner ``t`` by the displacements of its carriers,
+    which is not exact under rotation; here each carrier ``j`` moves it as its own neighbourhood moves,
+    ``t' = Σ w_j (p'_j + A_j (t - p_j))``, where ``A_j`` is the least-squares affine map of the six nearest geodesic neighbours,
+    drawn to a similarity with the node's rotation in directions they do not span. Rigid motions and uniform scalings
+    come through exactly.
+
+    "affine" maps the ellipse by the least-squares affine map of its ``hops``-ring, the baseline of the paper. "none"
+    moves the centres and nothing else.
+
+    Inert splats move and turn with the blended motion of the nearest active ones and keep their size, except with
+    "none", where they only move. The scale across the surface never changes.
+
+    Parameters
+    ----------
+    binding : KernelBinding
+        Carriers of the scene.
+    deformation : Deformation
+        Where its n nodes went and how they turned.
+    method : "surface", "affine" or "none"
+        See above.
+    hops : int
+        Rings of graph neighbours for "affine", 1 to 3.
+    out : AdaptedKernels, optional
+        An earlier result whose arrays are written over, which saves their allocation; it must not be used again.
+
+    Returns
+    -------
+    AdaptedKernels
+        In file order. A collapsed ellipse keeps the plane of its node's rotation and 1e-6 of its size; results are
+        finite wherever the rest values are.
+
+    Raises
+    ------
+    ValueError
+        Unknown method, ``hops`` outside 1 to 3, "affine" without a graph, or arrays of the wrong shape.
+
+    References
+    ----------
+    .. [1] SpLap, 3DV 2026, Eq. 9 and 10.
+    """
+    _validate(binding, deformation, method, hops)
+    rest = binding.rest
+    positions = np.ascontiguousarray(deformation.positions, np.float64)
+    rotations = np.ascontiguousarray(deformation.rotations, np.float64)
+    if method == "none":
+        rotations = np.broadcast_to(np.eye(3), rotations.shape).copy()
+    adapted = _blank(binding, out)
+    arrays = KernelArrays(
+        adapted.means,
+        adapted.rotations,
+        adapted.growths,
+        adapted.twists,
+        adapted.changed,
+        adapted.means_f32,
+        adapted.axes_f32,
+    )
+    moved = np.empty(len(positions), np.bool_)
+    still = STILL_SHARE * binding.ellipses.scene_scale
+    if method == "surface":
+        motions = np.empty((len(positions), 12))
+        find_motions(
+            binding.stencils,
+            binding.inverse_moments,
+            binding.dampings,
+            rest.centers,
+            positions,
+            rotations,
+            still,
+            moved,
+            motions,
+        )
+    else:
+        find_moved(rest.centers, positions, rotations, still, moved)
+    if method == "none":
+        _move_centers(rest, positions, moved, adapted)
+    else:
+        # Blocks that stay in the cache between the two loops.
+        carried, images = np.empty(_BLOCK, np.bool_), np.empty((_BLOCK, 9))
+        for lo in range(0, len(positions), _BLOCK):
+            hi = min(lo + _BLOCK, len(positions))
+            if method == "surface":
+                carry_triangles(
+                    lo,
+                    hi,
+                    binding.carriers,
+                    binding.weights,
+                    rest.centers,
+                    rest.semi_axes,
+                    motions,
+                    moved,
+                    carried,
+                    images,
+                )
+            else:
+                map_rings(
+                    lo,
+                    hi,
+                    hops,
+                    binding.graph.indptr,
+                    binding.graph.indices,
+                    rest.centers,
+                    rest.semi_axes,
+                    positions,
+                    rotations,
+                    moved,
+                    carried,
+                    images,
+                )
+            write_kernels(lo, hi, carried, images, rest, rotations, arrays)
+    adapt_inert(
+        binding.inert_rows,
+        binding.inert_carriers,
+        binding.inert_weights,
+        rest,
+        positions,
+        rotations,
+        moved,
+        arrays,
+    )
+    return adapted
+
+
+def adapted_splats(splats: Splats, adapted: AdaptedKernels) -> Splats:
+    """Splats to write to a file: those of the scene, with the changed rows replaced.
+
+    Parameters
+    ----------
+    splats : Splats
+        The scene that was bound.
+    adapted : AdaptedKernels
+        Its adapted kernels.
+
+    Returns
+    -------
+    Splats
+        New arrays of the same types. Unchanged rows, opacities and the constant colour are the file's own, bit for
+        bit; view-dependent colour is turned where the splat is.
+
+    Raises
+    ------
+    ValueError
+        If the number of splats differs.
+    """
+    if splats.n_splats != len(adapted.means):
+        raise ValueError(f"adapted kernels are of {len(adapted.means)} splats, the scene has {splats.n_splats}")
+    changed = adapted.changed
+
+    def replaced(old, new):
+        result = np.array(old)
+        result[changed] = new[changed]
+        return result
+
+    return Splats(
+        means=replaced(splats.means, adapted.means),
+        log_scales=replaced(splats.log_scales, adapted.log_scales),
+        quats=replaced(splats.quats, adapted.quats),
+        logit_opacities=splats.logit_opacities,
+        sh0=splats.sh0,
+        shN=rotated_sh(splats.shN, adapted.rotations, changed).astype(splats.shN.dtype, copy=False),
+        thresholds=splats.thresholds,
+        filter_radii=splats.filter_radii,
+        normal_axis=splats.normal_axis,
+    )
+
+
+def _validate(binding, deformation, method, hops):
+    n = binding.ellipses.n_nodes
+    if method not in ("surface", "affine", "none"):
+        raise ValueError(f"adaptation method must be 'surface', 'affine' or 'none', got {method!r}")
+    if method == "affine" and hops not in (1, 2, 3):
+        raise ValueError(f"hops must be 1, 2 or 3, got {hops}")
+    if method == "affine" and binding.graph is None:
+        raise ValueError("affine adaptation needs a KernelBinding made with the splat graph")
+    if np.shape(deformation.positions) != (n, 3):
+        raise ValueError(f"deformation.positions must have shape ({n}, 3), got {np.shape(deformation.positions)}")
+    if np.shape(deformation.rotations) != (n, 3, 3):
+        raise ValueError(f"deformation.rotations must have shape ({n}, 3, 3), got {np.shape(deformation.rotations)}")
+
+
+def _blank(binding: KernelBinding, out: AdaptedKernels | None) -> AdaptedKernels:
+    """Kernels yet to be written, in the arrays of ``out`` if given.
+
+    Always a new object, so that nothing derived from the earlier result is taken for this one's.
+    """
+    N = binding.splats.n_splats
+    if out is None:
+        return AdaptedKernels(
+            binding,
+            means=np.empty((N, 3)),
+            rotations=np.empty((N, 3, 3)),
+            growths=np.empty((N, 2)),
+            twists=np.empty((N, 2)),
+            changed=np.empty(N, np.bool_),
+            means_f32=np.empty((N, 3), np.float32),
+            axes_f32=np.empty((N, 2, 3), np.float32),
+        )
+    if len(out.means) != N:
+        raise ValueError(f"out holds {len(out.means)} splats, the scene has {N}")
+    return replace(out, binding=binding)
+
+
+def _move_centers(rest, positions, moved, adapted):
+    adapted.means[:] = adapted.means_f32[:] = rest.means
+    adapted.rotations[:] = np.eye(3)
+    adapted.growths[:] = 1.0
+    adapted.twists[:] = (1.0, 0.0)
+    adapted.axes_f32[:] = rest.axes_f32
+    rows = rest.rows[moved]
+    adapted.means[rows] = adapted.means_f32[rows] = positions[moved]
+    adapted.changed[:] = False
+    adapted.changed[rows] = True
