@@ -79,8 +79,8 @@ def no_leaked_vtk() -> Iterator[None]:
     before = _render_windows()
     yield
     gc.collect()
-    leaked = [window for window in _render_windows() if window not in before]
-    assert not leaked, f"VTK render windows left alive: {', '.join(sorted(type(window()).__name__ for window in leaked))}"
+    leaked = [type(window()).__name__ for window in _render_windows() if window not in before]
+    assert not leaked, f"VTK render windows left alive: {', '.join(leaked)}"
 
 
 def _render_windows() -> set[weakref.ref]:
