@@ -25,6 +25,7 @@ from splap_editor.ui.main_window import MainWindow
 from splap_editor.ui.theme import apply_theme
 from splap_editor.ui.viewport_widget import ViewportWidget, surface_format
 from splap_editor.viewport.scene_view import SceneView
+from splap_editor.viewport.viewport import Viewport
 
 
 class Mailbox(QObject):
@@ -70,10 +71,10 @@ def make_window(cache: StageCache | None = None) -> MainWindow:
     mailbox = Mailbox()
     session = Session(mailbox.post, cache=cache or StageCache())
     widget = ViewportWidget()
-    view = SceneView(
-        session, widget.render_window, widget.update, renderer=widget.renderer, scale=widget.devicePixelRatioF()
-    )
-    context = ToolContext(session, view)
+    scale = widget.devicePixelRatioF()
+    viewport = Viewport(widget.render_window, widget.update, renderer=widget.renderer, scale=scale)
+    view = SceneView(session, viewport)
+    context = ToolContext(session, viewport)
     context.navigate = NavigateTool(context)
     tools = ToolManager(
         context,

@@ -8,7 +8,8 @@ from PySide6.QtCore import QSettings
 from splap_editor.session.signals import Signal
 from splap_editor.viewport.scene_view import SceneView
 from splap_editor.viewport.splat_actor import DisplayMode
-from splap_editor.viewport.viewport import BACKGROUND, DEFAULT_LOOKS, Compare
+from splap_editor.viewport.splat_scene import DEFAULT_LOOKS, Compare
+from splap_editor.viewport.viewport import BACKGROUND
 
 MODES = {"ellipses": DisplayMode.ELLIPSES, "splats": DisplayMode.SPLATS, "points": DisplayMode.POINTS}
 BACKGROUNDS = {
@@ -97,14 +98,14 @@ class Display:
         options = self.options
         mode = MODES[options.mode]
         look = DEFAULT_LOOKS[mode]
-        view.look = replace(
+        view.viewport.splats.look = replace(
             look,
             size_factor=options.size_factor,
             opacity_cut=options.opacity_cut,
             backface_tint=(*look.backface_tint[:3], options.backface),
         )
-        view.compare = Compare(options.shown)
-        view.set_background(*BACKGROUNDS[options.background])
+        view.viewport.splats.compare = Compare(options.shown)
+        view.viewport.set_background(*BACKGROUNDS[options.background])
         if view.shows_tints != options.tints:
             view.shows_tints = options.tints
 

@@ -133,7 +133,7 @@ class MainWindow(QMainWindow):
                 "file": self.files,
                 "edit": EditCommands(session, tools),
                 "select": SelectCommands(session, select_tool),
-                "handle": HandleCommands(session, view),
+                "handle": HandleCommands(session, view.viewport),
                 "display": DisplayCommands(self.display),
                 "view": ViewCommands(session, view, self, self.dock),
                 "tool": ToolCommands(tools, select_tool),
@@ -269,7 +269,7 @@ class MainWindow(QMainWindow):
 
     def _on_viewport_resized(self) -> None:
         self.overlay.setGeometry(self.viewport.rect())
-        self.view.set_scale(self.viewport.devicePixelRatioF())
+        self.view.viewport.set_scale(self.viewport.devicePixelRatioF())
 
     def _on_menu_wanted(self, position: QPoint) -> None:
         menu = QMenu(self)
@@ -302,7 +302,7 @@ class MainWindow(QMainWindow):
 
     def show_picture_dialog(self) -> None:
         """Ask for a size and write the view as a PNG."""
-        PictureDialog(self, self.view, self.session.scene.file.path, self.toast).open()
+        PictureDialog(self, self.view.viewport, self.session.scene.file.path, self.toast).open()
 
     # ---------------------------------------------------------------- dropped files
 
@@ -357,7 +357,7 @@ class MainWindow(QMainWindow):
         if layout is not None:
             self.restoreState(layout, LAYOUT_VERSION)
         self.actions_.check("view.panels", not self.dock.isHidden())
-        self.actions_.check("view.turntable", self.view.camera.is_turntable)
+        self.actions_.check("view.turntable", self.view.viewport.camera.is_turntable)
 
 
 def _scene_meets(scene: Scene, condition: str) -> bool:

@@ -21,8 +21,8 @@ from splap_editor.ui.number_field import NumberField
 from splap_editor.ui.options_form import form_label
 from splap_editor.ui.theme import STEP
 from splap_editor.ui.toast import Toast
-from splap_editor.viewport.scene_view import SceneView
 from splap_editor.viewport.screenshot import LARGEST_PX, screenshot
+from splap_editor.viewport.viewport import Viewport
 
 SIZES = {"Full HD": (1920, 1080), "4K": (3840, 2160), "Square": (2048, 2048)}
 
@@ -30,12 +30,12 @@ SIZES = {"Full HD": (1920, 1080), "4K": (3840, 2160), "Square": (2048, 2048)}
 class PictureDialog(QDialog):
     """Asks for size and background, then for a name."""
 
-    def __init__(self, parent: QWidget, view: SceneView, source: Path, toast: Toast) -> None:
+    def __init__(self, parent: QWidget, viewport: Viewport, source: Path, toast: Toast) -> None:
         super().__init__(parent)
         self.setWindowTitle("Save picture")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        self._view, self._source, self._toast = view, source, toast
-        projection = view.projection()
+        self._viewport, self._source, self._toast = viewport, source, toast
+        projection = viewport.projection
         sizes = {"As in the window": (projection.width, projection.height), **SIZES}
         self.preset = QComboBox()
         for name, size in sizes.items():
@@ -91,7 +91,7 @@ class PictureDialog(QDialog):
         QSettings().setValue("files/pictures", str(path.parent))
         width, height = int(self.width_field.value()), int(self.height_field.value())
         try:
-            pixels = screenshot(self._view, width, height, is_transparent=self.transparent.isChecked())
+            pixels = screenshot(self._viewport, width, height, is_transparent=self.transparent.isChecked())
         except (ValueError, MemoryError) as error:
             self._toast.fail(f"The picture was not saved: {error}")
             return

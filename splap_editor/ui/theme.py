@@ -117,7 +117,7 @@ def style_sheet() -> str:
     QMenu {{ background: {PANEL}; border: 1px solid {LINE}; padding: 4px; }}
     QMenu::item {{ padding: 5px 28px 5px 8px; border-radius: 3px; }}
     QMenu::icon {{ padding-left: 6px; }}
-    QMenu::item:selected {{ background: {ACCENT}; color: {ON_ACCENT}; }}
+    QMenu::item:selected {{ background: #3b3c41; color: #ffffff; }}
     QMenu::item:disabled {{ color: {FAINT}; background: transparent; }}
     QMenu::separator {{ height: 1px; background: {LINE}; margin: 4px 8px; }}
 
@@ -150,6 +150,7 @@ def style_sheet() -> str:
         background: {FIELD}; border: 1px solid {LINE}; border-radius: 4px; padding: 3px 6px; min-height: 16px;
         selection-background-color: {ACCENT}; selection-color: {ON_ACCENT};
     }}
+    QAbstractSpinBox QLineEdit {{ background: transparent; border: 0; padding: 0; min-height: 0; }}
     QLineEdit:hover, QAbstractSpinBox:hover, QComboBox:hover {{ border-color: {FAINT}; }}
     QLineEdit:focus, QAbstractSpinBox:focus, QComboBox:focus {{ border-color: {ACCENT}; }}
     QLineEdit:disabled, QAbstractSpinBox:disabled, QComboBox:disabled {{ color: {FAINT}; background: {PANEL}; }}
@@ -188,7 +189,8 @@ def style_sheet() -> str:
 
     #panelSection {{ border-bottom: 1px solid {GROUND}; }}
     #sectionHeader {{ text-align: left; padding: 8px; font-weight: 600; border-radius: 0; }}
-    #sectionHeader:hover {{ background: {RAISED}; }}
+    #sectionHeader, #sectionHeader:checked {{ background: {PANEL}; color: {TEXT}; }}
+    #sectionHeader:hover, #sectionHeader:checked:hover {{ background: {RAISED}; }}
     #handleRow {{ border-radius: 4px; }}
     #handleRow[active="true"] {{ background: {RAISED}; }}
     QLabel[tone="quiet"] {{ color: {QUIET}; }}

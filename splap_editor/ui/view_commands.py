@@ -26,27 +26,28 @@ class ViewCommands(QObject):
         super().__init__(window)
         self._session = session
         self._view = view
+        self._viewport = view.viewport
         self._window = window
         self._dock = dock
         self._flight = QVariantAnimation(self, duration=FLIGHT_MS, startValue=0.0, endValue=1.0)
         self._flight.valueChanged.connect(self._on_flown)
-        self._flight.finished.connect(view.end_motion)
+        self._flight.finished.connect(view.viewport.end_motion)
         self._ends: tuple[View, View] | None = None
 
     def fly_to(self, end: View) -> None:
         """Move the camera there, quickly enough not to wait for."""
         if self._flight.state() == QVariantAnimation.State.Running:
             self._flight.stop()
-            self._view.end_motion()
-        self._ends = (self._view.camera.view, end)
-        self._view.begin_motion()
+            self._viewport.end_motion()
+        self._ends = (self._viewport.camera.view, end)
+        self._viewport.begin_motion()
         self._flight.start()
 
     def _on_flown(self, share: float) -> None:
         start, end = self._ends
         # Slow at the end: the eye finds its place again.
-        self._view.camera.view = blended(start, end, 1.0 - (1.0 - share) ** 3)
-        self._view.camera_moved()
+        self._viewport.camera.view = blended(start, end, 1.0 - (1.0 - share) ** 3)
+        self._viewport.camera_moved()
 
     def frame_selection(self) -> None:
         """Fly to the selection, else to the chosen handles, else to everything."""
@@ -55,13 +56,13 @@ class ViewCommands(QObject):
         if not len(rows):
             rows = self._view.rows_of_handles(scene.active_handles)
         if len(rows):
-            self.fly_to(self._view.camera.frame(np.asarray(scene.positions)[rows]))
+            self.fly_to(self._viewport.frame(rows))
         else:
             self.frame_all()
 
     def frame_all(self) -> None:
         """Fly to where everything is in view."""
-        self.fly_to(self._view.camera.frame(self._view.core_points()))
+        self.fly_to(self._viewport.frame())
 
     def front(self) -> None:
         """Look along +Y."""
@@ -88,16 +89,16 @@ class ViewCommands(QObject):
         self._look_from((0.0, 0.0, -1.0))
 
     def _look_from(self, axis: tuple[float, float, float]) -> None:
-        self.fly_to(self._view.camera.look_from(axis))
+        self.fly_to(self._viewport.camera.look_from(axis))
 
     def orthographic(self, on: bool) -> None:
         """Drop perspective, or bring it back."""
-        self._view.camera.set_parallel(on)
-        self._view.camera_moved()
+        self._viewport.camera.set_parallel(on)
+        self._viewport.camera_moved()
 
     def turntable(self, on: bool) -> None:
         """Keep the horizon level."""
-        self._view.camera.is_turntable = on
+        self._viewport.camera.is_turntable = on
 
     def panels(self, on: bool) -> None:
         """Show or hide the panels."""
