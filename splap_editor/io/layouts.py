@@ -53,7 +53,7 @@ LAYOUTS: dict[str, Layout] = {
         Layout("rade-gs", "a filter_3D column"),
         Layout("sugar", "one and the same scale_0 everywhere", normal_axis=0),
         Layout("mani-gs", "material columns", bound=True),
-        Layout("gaussianmesh", "columns that bind splats to triangles"),
+        Layout("gaussianmesh", "columns that bind splats to triangles", bound=True),
         Layout("sc-gs", "fea_ columns"),
         Layout("gsplat", "gsplat's column order"),
         Layout("brush", "Brush's comment or column order"),

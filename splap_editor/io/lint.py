@@ -82,7 +82,8 @@ def lint(splats: Splats) -> list[Finding]:
     low, high = np.percentile(means, [1, 99], axis=0)
     side = (high - low).max()
     if side > 0:
-        giant = np.asarray(splats.log_scales).max(axis=1) > np.log(GIANT * side)
+        longest = np.asarray(splats.log_scales).max(axis=1)
+        giant = (longest > np.log(GIANT * side)) & (longest < np.inf)
         _add(findings, "giants", f"{{}} a size above {GIANT:.0%} of the scene", giant)
     if splats.thresholds is not None:
         cut = np.asarray(splats.thresholds) >= 1

@@ -117,6 +117,7 @@ def text_table(name: str, header: PlyHeader, body: NDArray[np.uint8]) -> PlyTabl
             "Copy or export it again."
         )
     bounds = np.concatenate([[0], ends])
+    _require_whole_last_line(name, header, body[bounds[n_lines - 1] : bounds[n_lines]].tobytes())
     first = 0
     for element in header.elements:
         if element.name == "vertex":
@@ -127,6 +128,15 @@ def text_table(name: str, header: PlyHeader, body: NDArray[np.uint8]) -> PlyTabl
     parsed = _parsed_list_columns if vertex.has_lists else _parsed_columns
     columns = parsed(name, vertex, body, starts)
     return TextTable(name, header, body, columns, starts)
+
+
+def _require_whole_last_line(name: str, header: PlyHeader, line: bytes) -> None:
+    """Refuse a file that ends in the middle of a line; elements other than vertices are not looked at otherwise."""
+    last = next(element for element in reversed(header.elements) if element.count)
+    try:
+        _last_words(last, line.split())
+    except (ValueError, IndexError):
+        raise _damage(name, last.count - 1, f"whole (element {last.name!r})") from None
 
 
 def _parsed_columns(

@@ -223,5 +223,5 @@ def logits(opacities: NDArray[np.floating], floor: float = 0.0) -> NDArray[np.fl
     """``log(α / (1 - α))``; -inf where α is below the floor, NaN where α is not in [0, 1]."""
     alpha = np.asarray(opacities, np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
-        values = np.where(alpha < floor, -np.inf, np.log(alpha / (1 - alpha)))
+        values = np.where((alpha >= 0) & (alpha < floor), -np.inf, np.log(alpha / (1 - alpha)))
     return values.astype(opacities.dtype)

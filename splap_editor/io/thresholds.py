@@ -3,9 +3,13 @@
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import zipfile
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,20 +55,20 @@ def read_thresholds(npz: Path, n_splats: int) -> Thresholds | str:
     import zlib
 
     try:
-        with np.load(npz, allow_pickle=False) as archive:
-            if "Vth_pdf" not in archive.files:
+        with zipfile.ZipFile(npz) as archive:
+            if "Vth_pdf.npy" not in archive.namelist():
                 return f"{npz.name} beside the file holds no Vth_pdf: it is read without thresholds."
             # The header is looked at first: a damaged one may promise more rows than the memory holds.
-            n_rows = _n_values(archive.zip, "Vth_pdf")
+            n_rows = _n_values(archive, "Vth_pdf")
             if n_rows != n_splats:
                 return (
                     f"{npz.name} holds {n_rows:,} thresholds for {n_splats:,} splats: it belongs to another save and "
                     "is not used. Put the archive of the same iteration beside the file."
                 )
-            cutoffs = np.abs(archive["Vth_pdf"].astype(np.float32)).reshape(n_splats)
+            cutoffs = np.abs(_values(archive, "Vth_pdf").astype(np.float32))
             floor = 0.0
-            if "Vth_opa" in archive.files and _n_values(archive.zip, "Vth_opa") == 1:
-                floor = float(archive["Vth_opa"].reshape(()))
+            if "Vth_opa.npy" in archive.namelist() and _n_values(archive, "Vth_opa") == 1:
+                floor = float(_values(archive, "Vth_opa")[0])
     except (OSError, ValueError, TypeError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
         return f"{npz.name} beside the file cannot be read ({error}): its thresholds are not used."
     bad = np.flatnonzero(~np.isfinite(cutoffs))
@@ -73,7 +77,7 @@ def read_thresholds(npz: Path, n_splats: int) -> Thresholds | str:
     return Thresholds(cutoffs, floor if np.isfinite(floor) else 0.0)
 
 
-def _n_values(archive: object, key: str) -> int:
+def _n_values(archive: "zipfile.ZipFile", key: str) -> int:
     """Number of values that the header of an array in the archive promises."""
     with archive.open(key + ".npy") as member:
         version = np.lib.format.read_magic(member)
@@ -82,3 +86,9 @@ def _n_values(archive: object, key: str) -> int:
     if dtype.kind not in "fiu":
         raise ValueError(f"{key} is not numeric")
     return int(np.prod(shape, dtype=object))
+
+
+def _values(archive: "zipfile.ZipFile", key: str) -> NDArray:
+    """Values of an array in the archive, flat."""
+    with archive.open(key + ".npy") as member:
+        return np.lib.format.read_array(member, allow_pickle=False).reshape(-1)

@@ -57,7 +57,7 @@ def moved(splats, rows):
     return dataclasses.replace(splats, means=means, quats=quats, log_scales=scales, shN=shN)
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(24))
 def test_unedited_splats_give_the_identical_file(seed, tmp_path):
     _, data = random_file(seed)
     (tmp_path / "in.ply").write_bytes(data)
@@ -67,7 +67,7 @@ def test_unedited_splats_give_the_identical_file(seed, tmp_path):
         assert (tmp_path / "out.ply").read_bytes() == data
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(24))
 def test_columns_mean_the_same_in_every_order_type_and_format(seed, tmp_path):
     columns, data = random_file(seed)
     (tmp_path / "in.ply").write_bytes(data)
@@ -89,7 +89,7 @@ def test_columns_mean_the_same_in_every_order_type_and_format(seed, tmp_path):
         np.testing.assert_allclose(colour, columns["green"] / 255, atol=1e-6)
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(24))
 def test_only_changed_cells_change(seed, tmp_path):
     columns, data = random_file(seed)
     (tmp_path / "in.ply").write_bytes(data)
@@ -118,7 +118,7 @@ def test_only_changed_cells_change(seed, tmp_path):
     np.testing.assert_array_equal(back.splats.means, file.splats.means)
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(24))
 def test_plyfile_reads_what_is_written(seed, tmp_path):
     columns, data = random_file(seed, comments=["plyfile takes ASCII only"])
     (tmp_path / "in.ply").write_bytes(data)
