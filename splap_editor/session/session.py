@@ -72,8 +72,7 @@ class Session:
         self.state = "empty"
         self.is_halted = False
         self._bound: BoundEdit | None = None
-        self._posed: Edit | None = None
-        self._settled: Edit | None = None
+        self._shown: tuple[Edit, bool] | None = None
         self._given_up: Edit | None = None
         self._pending_export: tuple[Path, dict] | None = None
         self._exported_edit: Edit | None = None
@@ -185,7 +184,7 @@ class Session:
 
     def refresh_pose(self) -> None:
         """Pose anew, although no handle moved: the view wants its presentation made again."""
-        self._posed = self._settled = None
+        self._shown = None
         self._advance()
 
     def close(self) -> None:
@@ -218,8 +217,11 @@ class Session:
             self._export_pending(scene)
 
     def _is_posed(self, edit: Edit, *, settled: bool) -> bool:
-        made = self._settled if settled else self._posed
-        return made is not None and binds_like(made, edit) and poses_like(made, edit)
+        """Whether the kernels on screen are those of an edit: settled, or the newest frame of a drag."""
+        if self._shown is None:
+            return False
+        made, is_settled = self._shown
+        return (is_settled or not settled) and binds_like(made, edit) and poses_like(made, edit)
 
     def _prepare(self, scene: Scene, options: GraphOptions) -> None:
         if self._is_making("prepare", lambda wanted: wanted == options):
@@ -234,7 +236,7 @@ class Session:
 
         def done(surface: Surface) -> None:
             if self.scene is scene:
-                self._bound = self._posed = self._settled = None
+                self._bound = self._shown = None
                 scene.set_surface(surface)
                 self._advance()
 
@@ -255,7 +257,7 @@ class Session:
         def done(bound: BoundEdit) -> None:
             if self.scene is scene and scene.surface is surface:
                 self._bound = bound
-                self._posed = self._settled = None
+                self._shown = None
                 self._advance()
 
         self._set_state("binding")
@@ -284,7 +286,7 @@ class Session:
             return kernels(bound.deformer.drag(transforms))
 
         def dragged(result: tuple) -> None:
-            self._posed = edit
+            self._shown = (edit, False)
             show(result)
             self._advance()
 
@@ -296,7 +298,7 @@ class Session:
             return kernels(bound.deformer.solve(transforms, progress=job.progress("settling"), shown=shown))
 
         def settled(result: tuple) -> None:
-            self._posed = self._settled = edit
+            self._shown = (edit, True)
             show(result)
             self._advance()
 
@@ -310,8 +312,8 @@ class Session:
     def _rest(self, scene: Scene, edit: Edit) -> None:
         self.worker.cancel("bind", "pose", "drag")
         self._bound = None
-        if scene.kernels is not None or self._settled is not edit:
-            self._posed = self._settled = edit
+        self._shown = None
+        if scene.kernels is not None:
             scene.set_pose(None)
         self._set_state("ready")
         self._export_pending(scene)
@@ -337,7 +339,7 @@ class Session:
         self._submit("export", f"Exporting {path.name}", export, done)
 
     def _show(self, scene: Scene) -> None:
-        self._bound = self._posed = self._settled = self._given_up = self._exported_edit = None
+        self._bound = self._shown = self._given_up = self._exported_edit = None
         self.is_halted = False
         self.scene = scene
         self.history.clear()

@@ -1,0 +1,321 @@
+"""A session as the window drives it, without the window."""
+
+import queue
+import shutil
+import threading
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from splap_editor.cli import main as command_line
+from splap_editor.io.ply import read_ply
+from splap_editor.resources import resource
+from splap_editor.session import pipeline
+from splap_editor.session.cache import StageCache
+from splap_editor.session.edit import Pose
+from splap_editor.session.placement import disc_rows, held_pose, rows_region
+from splap_editor.session.session import Session
+
+TUBE = resource("samples", "tube.ply")
+
+
+class MainThread:
+    """The event loop: runs what the workers post."""
+
+    def __init__(self):
+        self.calls = queue.Queue()
+
+    def post(self, call):
+        self.calls.put(call)
+
+    def run_until(self, condition, seconds=120.0):
+        end = time.monotonic() + seconds
+        while not condition():
+            try:
+                call = self.calls.get(timeout=max(end - time.monotonic(), 0.001))
+            except queue.Empty:
+                raise AssertionError("it did not happen in time") from None
+            call()
+
+
+@pytest.fixture
+def main():
+    return MainThread()
+
+
+@pytest.fixture
+def session(main, tmp_path):
+    session = Session(main.post, cache=StageCache(tmp_path / "cache"))
+    session.failures = []
+    session.failed.connect(lambda title, error: session.failures.append(str(error)))
+    yield session
+    session.close()
+
+
+@pytest.fixture
+def opened(main, session):
+    session.open(TUBE)
+    main.run_until(lambda: session.state == "ready")
+    return session
+
+
+def end_rows(scene, sign):
+    means = np.asarray(scene.splats.means, np.float64)
+    axis = int(np.argmax(np.ptp(means, axis=0)))
+    return disc_rows(scene, int(np.argmax(sign * means[:, axis])), 0.1 * float(np.ptp(means[:, axis])))
+
+
+def bent(main, session, lift=0.3):
+    """Pin one end, put a handle on the other and move it; settled."""
+    scene = session.scene
+    session.add_pin(rows_region(scene, end_rows(scene, -1)))
+    handle = session.add_handle(rows_region(scene, end_rows(scene, 1)))
+    session.preview_poses({handle.handle_id: Pose((lift, lift, 0.0))})
+    session.commit_preview("Move handle")
+    main.run_until(lambda: session.state == "settled")
+    return handle
+
+
+def test_opening_prepares_in_the_background(main, session):
+    states = []
+    session.state_changed.connect(lambda: states.append(session.state))
+    session.open(TUBE)
+    main.run_until(lambda: session.state == "ready")
+    assert states == ["preparing", "ready"]
+    assert session.scene.surface.graph.n_edges > 0 and session.failures == []
+
+
+def test_the_second_opening_skips_the_stages(main, opened):
+    assert "graph" in opened.scene.surface.timings_s
+    first = opened.scene
+    opened.open(TUBE)
+    main.run_until(lambda: opened.scene is not first and opened.state == "ready")
+    assert "graph" not in opened.scene.surface.timings_s
+
+
+def test_a_drag_shows_poses_and_settles(main, opened):
+    shown = []
+    scene = opened.scene
+    scene.pose_changed.connect(lambda: shown.append(scene.kernels))
+    handle = opened.add_handle(rows_region(scene, end_rows(scene, 1)))
+    main.run_until(lambda: opened.state == "settled")
+    for step in range(1, 6):
+        opened.preview_poses({handle.handle_id: Pose((0.05 * step, 0.0, 0.0))})
+        main.run_until(lambda n=len(shown): len(shown) > n)
+    assert opened.state == "dragging" and len(opened.history._commands) == 1
+    opened.commit_preview("Move handle")
+    main.run_until(lambda: opened.state == "settled")
+    held = np.mean(scene.kernels.means[handle.region.rows] - scene.splats.means[handle.region.rows], axis=0)
+    # Ellipses follow their corners, so the held splats' own centres are off by a small share of their size.
+    np.testing.assert_allclose(held, [0.25, 0.0, 0.0], atol=0.02)
+
+
+def test_the_newest_request_wins(main, opened):
+    scene = opened.scene
+    handle = opened.add_handle(rows_region(scene, end_rows(scene, 1)))
+    main.run_until(lambda: opened.state == "settled")
+    shown = []
+    scene.pose_changed.connect(lambda: shown.append(scene.kernels))
+    for step in range(1, 101):
+        opened.preview_poses({handle.handle_id: Pose((0.002 * step, 0.0, 0.0))})
+    main.run_until(lambda: opened._is_posed(scene.preview, settled=False))
+    assert len(shown) < 50, "requests that came too late are skipped"
+
+
+def test_undo_and_redo_swap_the_pose(main, opened):
+    bent(main, opened)
+    posed = opened.scene.kernels.means.copy()
+    opened.history.undo()
+    main.run_until(lambda: opened.state == "settled")
+    assert not opened.scene.kernels.changed.any()
+    opened.history.redo()
+    main.run_until(lambda: opened.state == "settled")
+    np.testing.assert_array_equal(opened.scene.kernels.means, posed)
+    while opened.history.undo():
+        pass
+    main.run_until(lambda: opened.state == "ready")
+    assert opened.scene.kernels is None and opened.scene.edit.handles == ()
+
+
+def test_a_cancelled_drag_leaves_no_trace(main, opened):
+    scene = opened.scene
+    handle = opened.add_handle(rows_region(scene, end_rows(scene, 1)))
+    opened.preview_poses({handle.handle_id: Pose((0.3, 0.0, 0.0))})
+    opened.cancel_preview()
+    main.run_until(lambda: opened.state == "settled")
+    assert opened.scene.edit.is_identity and not opened.scene.kernels.changed.any()
+    assert opened.history.undo_label == "Place handle"
+
+
+def test_what_is_exported_is_what_is_shown_and_what_the_command_line_makes(main, opened, tmp_path):
+    bent(main, opened)
+    reports = []
+    opened.exported.connect(reports.append)
+    assert opened.has_unexported_edit
+    opened.save_edit(tmp_path / "edit.json")
+    opened.export(tmp_path / "window.ply")
+    main.run_until(lambda: reports)
+    assert not opened.has_unexported_edit
+    written = read_ply(tmp_path / "window.ply").splats
+    np.testing.assert_array_equal(written.means, opened.scene.kernels.means.astype(np.float32))
+    assert reports[0].n_changed == np.count_nonzero(opened.scene.kernels.changed)
+    arguments = ["deform", str(TUBE), "--recipe", str(tmp_path / "edit.json"), "-o", str(tmp_path / "cli.ply")]
+    assert command_line([*arguments, "--quiet"]) == 0
+    assert (tmp_path / "cli.ply").read_bytes() == (tmp_path / "window.ply").read_bytes()
+
+
+def test_the_path_of_the_drag_does_not_matter(main, opened):
+    handle = bent(main, opened)
+    direct = opened.scene.kernels.means.copy()
+    for pose in (Pose((-0.4, 0.1, 0.5)), Pose((0.0, -0.5, 0.2)), Pose((0.3, 0.3, 0.0))):
+        opened.preview_poses({handle.handle_id: pose})
+        main.run_until(lambda: opened._is_posed(opened.scene.preview, settled=False))
+    opened.commit_preview("Move handle")
+    main.run_until(lambda: opened.state == "settled")
+    np.testing.assert_array_equal(opened.scene.kernels.means, direct)
+
+
+def test_export_waits_for_the_pose_to_settle(main, opened, tmp_path):
+    handle = bent(main, opened)
+    reports = []
+    opened.exported.connect(reports.append)
+    opened.preview_poses({handle.handle_id: Pose((-0.2, 0.0, 0.1))})
+    opened.commit_preview("Move handle")
+    opened.export(tmp_path / "out.ply")
+    main.run_until(lambda: reports)
+    assert opened.state == "settled"
+    written = read_ply(tmp_path / "out.ply").splats
+    np.testing.assert_array_equal(written.means, opened.scene.kernels.means.astype(np.float32))
+
+
+def test_an_unedited_scene_exports_byte_for_byte(main, opened, tmp_path):
+    reports = []
+    opened.exported.connect(reports.append)
+    opened.export(tmp_path / "copy.ply")
+    main.run_until(lambda: reports)
+    assert (tmp_path / "copy.ply").read_bytes() == TUBE.read_bytes()
+    assert str(reports[0]).endswith("unchanged")
+
+
+def test_a_bad_file_leaves_the_open_scene_alone(main, opened, tmp_path):
+    bent(main, opened)
+    before, edit = opened.scene, opened.scene.edit
+    bad = tmp_path / "bad.ply"
+    bad.write_bytes(b"not a ply")
+    opened.open(bad)
+    main.run_until(lambda: opened.failures)
+    main.run_until(lambda: opened.state == "settled")
+    assert opened.scene is before and opened.scene.edit is edit
+    opened.open(tmp_path / "gone.ply")
+    main.run_until(lambda: len(opened.failures) == 2)
+    assert opened.scene is before
+
+
+def test_an_export_that_fails_says_so_and_loses_nothing(main, opened, tmp_path):
+    bent(main, opened)
+    opened.export(tmp_path / "no such folder" / "out.ply")
+    main.run_until(lambda: opened.failures)
+    assert opened.has_unexported_edit and opened.state == "settled"
+
+
+def slow_graph(monkeypatch, started):
+    """Make the graph stage wait until it is cancelled."""
+    real = pipeline.splat_graph
+
+    def graph(ellipses, options, *, progress):
+        started.set()
+        while not getattr(graph, "go", False):
+            progress(0.1)
+        return real(ellipses, options, progress=progress)
+
+    monkeypatch.setattr(pipeline, "splat_graph", graph)
+    return graph
+
+
+def test_preparing_can_be_cancelled_and_resumed(main, session, monkeypatch):
+    started = threading.Event()
+    graph = slow_graph(monkeypatch, started)
+    session.open(TUBE)
+    main.run_until(started.is_set)
+    session.halt()
+    main.run_until(lambda: not session.worker.is_busy())
+    assert session.state == "halted" and session.scene.surface is None and session.failures == []
+    assert not list((session.cache.folder).glob("*"))
+    graph.go = True
+    session.resume()
+    main.run_until(lambda: session.state == "ready")
+
+
+def test_a_second_file_cancels_the_preparing_of_the_first(main, session, monkeypatch, tmp_path):
+    started = threading.Event()
+    graph = slow_graph(monkeypatch, started)
+    session.open(TUBE)
+    main.run_until(started.is_set)
+    other = tmp_path / "other.ply"
+    shutil.copy(TUBE, other)
+    session.open(other)
+    main.run_until(lambda: session.scene is not None and session.scene.file.path == other)
+    graph.go = True
+    main.run_until(lambda: session.state == "ready")
+    assert session.failures == []
+
+
+def test_a_handle_placed_on_a_moved_part_moves_nothing(main, opened):
+    bent(main, opened)
+    scene = opened.scene
+    before = scene.kernels.means.copy()
+    middle = np.asarray(scene.splats.means, np.float64)
+    row = int(np.argmin(np.linalg.norm(middle - middle.mean(axis=0), axis=1)))
+    region = rows_region(scene, disc_rows(scene, row, 0.05))
+    pose = held_pose(scene, region)
+    opened.add_handle(region, pose=pose)
+    main.run_until(lambda: opened.state == "settled")
+    moved = np.linalg.norm(scene.kernels.means - before, axis=1)
+    # Holding a disc rigidly where it bent a little shifts it by a small share of the bend.
+    assert moved.max() < 0.02 * scene.ellipses.scene_scale
+
+
+def test_a_disabled_handle_lets_go(main, opened):
+    handle = bent(main, opened)
+    edit = opened.scene.edit
+    opened.change_edit(edit.with_handle(replace(edit.handle(handle.handle_id), enabled=False)), "Disable handle")
+    main.run_until(lambda: opened.state == "ready")
+    assert opened.scene.kernels is None
+
+
+def test_changing_the_graph_prepares_anew(main, opened):
+    bent(main, opened)
+    edit = opened.scene.edit
+    opened.change_edit(replace(edit, graph=replace(edit.graph, k=12)), "Change graph")
+    main.run_until(lambda: opened.state == "settled")
+    assert opened.scene.surface.options.k == 12
+
+
+def test_weights_by_bounded_biharmonics_pose_too(main, opened):
+    bent(main, opened)
+    opened.change_edit(replace(opened.scene.edit, method="bbw"), "Change method")
+    main.run_until(lambda: opened.state == "settled")
+    assert opened.bound.deformer.weights.shape[1] == 1
+    assert opened.scene.kernels.changed.any()
+
+
+def test_selection_steps_are_undone_too(opened):
+    mask = np.zeros(opened.scene.splats.n_splats, bool)
+    mask[5:50] = True
+    opened.change_mask("selection", mask, "Select")
+    opened.change_mask("selection", mask, "Select")
+    assert opened.history.undo() and not opened.history.can_undo
+    assert not opened.scene.selection.any()
+    opened.history.redo()
+    np.testing.assert_array_equal(opened.scene.selection, mask)
+
+
+def test_closing_while_a_job_runs_ends_cleanly(main, session, monkeypatch):
+    started = threading.Event()
+    slow_graph(monkeypatch, started)
+    session.open(TUBE)
+    main.run_until(started.is_set)
+    session.close()
+    assert not any(thread.name.startswith("splap") for thread in threading.enumerate())
