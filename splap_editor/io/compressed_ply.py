@@ -43,17 +43,21 @@ def decompressed(table: PlyTable) -> Splats:
             f"{table.name} is damaged: {n:,} compressed splats need {-(-n // CHUNK):,} chunks, {held:,} are there. "
             "Export it again."
         )
+    if any(element.has_lists for element in table.header.elements):
+        raise PlyError(f"{table.name} is damaged: compressed splats have no lists. Export it again.")
     bounds = {column: np.repeat(chunks[column].astype(np.float32), CHUNK)[:n] for column in chunks.dtype.names}
+    packed = table.columns["packed_color"].astype(np.uint32)
+    colour = np.stack([(packed >> shift & 255).astype(np.float32) / 255 for shift in (24, 16, 8, 0)], axis=1)
+    rgb = colour[:, :3]
     try:
         means = _lerped(_unit_11_10_11(table.columns["packed_position"]), bounds, "{}_x", "{}_y", "{}_z")
         scales = _lerped(
             _unit_11_10_11(table.columns["packed_scale"]), bounds, "{}_scale_x", "{}_scale_y", "{}_scale_z"
         )
+        if "min_r" in bounds:
+            rgb = _lerped(rgb, bounds, "{}_r", "{}_g", "{}_b")
     except KeyError as error:
         raise PlyError(f"{table.name} is damaged: its chunks lack {error}. Export it again.") from None
-    packed = table.columns["packed_color"].astype(np.uint32)
-    colour = np.stack([(packed >> shift & 255).astype(np.float32) / 255 for shift in (24, 16, 8, 0)], axis=1)
-    rgb = _lerped(colour[:, :3], bounds, "{}_r", "{}_g", "{}_b") if "min_r" in bounds else colour[:, :3]
     with np.errstate(divide="ignore"):
         opacities = np.log(colour[:, 3]) - np.log1p(-colour[:, 3])
     return Splats(

@@ -1,5 +1,6 @@
 """Ascii PLY files: numbers are parsed, lines are kept."""
 
+import contextlib
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ from splap_editor.io.ply_header import PlyElement, PlyError, PlyHeader
 from splap_editor.io.ply_table import CellChanges, NewColumn, PlyTable, cast_values
 
 _BLOCK_ROWS = 1 << 13
+_NUMBER_BYTES = b"0123456789+-.eEinfatyINFATY \t\r\n"
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,10 +149,11 @@ def _parsed_columns(
     for lo in range(0, vertex.count, _BLOCK_ROWS):
         hi = min(lo + _BLOCK_ROWS, vertex.count)
         text = body[starts[lo] : starts[hi]].tobytes()
-        try:
-            numbers = np.loadtxt(BytesIO(text), dtype=np.float64, comments=None, ndmin=2)
-        except ValueError:
-            numbers = None
+        numbers = None
+        # Bytes that only some parsers take for blanks would split a line differently when it is written.
+        if not text.translate(None, _NUMBER_BYTES):
+            with contextlib.suppress(ValueError):
+                numbers = np.loadtxt(BytesIO(text), dtype=np.float64, comments=None, ndmin=2)
         if numbers is None or numbers.shape != (hi - lo, len(columns)):
             raise _damage(name, _first_bad_line(text, lo, len(columns)), f"{len(columns)} numbers")
         for column, values in zip(columns.values(), numbers.T, strict=True):
@@ -186,7 +189,7 @@ def _first_bad_line(text: bytes, row: int, n_columns: int) -> int:
     for line in text.splitlines():
         words = line.split()
         try:
-            if len([float(word) for word in words]) != n_columns:
+            if line.translate(None, _NUMBER_BYTES) or len([float(word) for word in words]) != n_columns:
                 break
         except ValueError:
             break

@@ -139,7 +139,7 @@ def test_spherical_harmonics_must_make_whole_degrees(tmp_path):
     refused(tmp_path, ply_bytes(columns(f_rest_3=None, f_rest_9=nine)), "9 f_rest columns, but f_rest_3 is missing")
 
 
-@pytest.mark.parametrize("word", [b"spam", b"1,5", b"1 2", b""])
+@pytest.mark.parametrize("word", [b"spam", b"1,5", b"1 2", b"", b"1\xa02", b"1_0"])
 def test_a_damaged_number_in_a_text_file_is_located(word, tmp_path):
     lines = ply_bytes(columns(), "ascii").split(b"\n")
     first = lines.index(b"end_header") + 1
