@@ -2,7 +2,7 @@
 
 from PySide6.QtCore import QEvent, QPoint, Qt, Signal
 from PySide6.QtGui import QEnterEvent, QKeyEvent, QMouseEvent, QWheelEvent
-from PySide6.QtWidgets import QAbstractSpinBox, QDoubleSpinBox, QLabel, QWidget
+from PySide6.QtWidgets import QDoubleSpinBox, QLabel, QWidget
 
 
 class NumberField(QDoubleSpinBox):
@@ -29,10 +29,10 @@ class NumberField(QDoubleSpinBox):
         self.setDecimals(decimals)
         self.setSingleStep(step)
         self.setSuffix(f" {unit}" if unit else "")
-        self.setButtonSymbols(QAbstractSpinBox.ButtonSymbols.NoButtons)
         self.setKeyboardTracking(False)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setMinimumWidth(48)
+        self.lineEdit().setTextMargins(5, 0, 2, 0)
         self.valueChanged.connect(self.committed)
 
     def show_value(self, value: float) -> None:

@@ -150,7 +150,9 @@ def style_sheet() -> str:
         background: {FIELD}; border: 1px solid {LINE}; border-radius: 4px; padding: 3px 6px; min-height: 16px;
         selection-background-color: {ACCENT}; selection-color: {ON_ACCENT};
     }}
-    QAbstractSpinBox QLineEdit {{ background: transparent; border: 0; padding: 0; min-height: 0; }}
+    QAbstractSpinBox::up-button, QAbstractSpinBox::down-button {{ width: 0; border: 0; }}
+    QAbstractSpinBox {{ padding: 3px 0; }}
+    QAbstractSpinBox QLineEdit {{ background: transparent; border: 0; padding: 0 6px; min-height: 0; }}
     QLineEdit:hover, QAbstractSpinBox:hover, QComboBox:hover {{ border-color: {FAINT}; }}
     QLineEdit:focus, QAbstractSpinBox:focus, QComboBox:focus {{ border-color: {ACCENT}; }}
     QLineEdit:disabled, QAbstractSpinBox:disabled, QComboBox:disabled {{ color: {FAINT}; background: {PANEL}; }}

@@ -1,6 +1,7 @@
 """The Qt widget around the viewport: one VTK render per shown frame, pointer and key events for the tools."""
 
 import os
+import sys
 from collections.abc import Callable
 from math import log
 from time import perf_counter
@@ -128,7 +129,7 @@ class ViewportWidget(QtInteractor):
 
     def leaveEvent(self, event: QEvent) -> None:
         """Tell that the pointer is gone."""
-        self._pointer_taker(PointerEvent("leave", (-1.0, -1.0)))
+        self._tell(self._pointer_taker, PointerEvent("leave", (-1.0, -1.0)))
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         """Pass a wheel turn, or the move of two fingers on a trackpad."""
@@ -165,7 +166,8 @@ class ViewportWidget(QtInteractor):
         position = event.position()
         buttons = event.buttons() if hasattr(event, "buttons") else Qt.MouseButton.NoButton
         button = BUTTONS.get(event.button(), "") if kind in ("press", "release", "double") else ""
-        return self._pointer_taker(
+        return self._tell(
+            self._pointer_taker,
             PointerEvent(
                 kind,
                 (position.x() * ratio, position.y() * ratio),
@@ -175,8 +177,17 @@ class ViewportWidget(QtInteractor):
                 ctrl=bool(held & Qt.KeyboardModifier.ControlModifier),
                 alt=bool(held & Qt.KeyboardModifier.AltModifier),
                 **more,
-            )
+            ),
         )
+
+    @staticmethod
+    def _tell(taker: Callable[[object], bool], event: object) -> bool:
+        """Pass an event on; what goes wrong there reaches the exception hook, which Qt would keep it from."""
+        try:
+            return taker(event)
+        except Exception as error:
+            sys.excepthook(type(error), error, error.__traceback__)
+            return True
 
     # ---------------------------------------------------------------- keys
 
@@ -212,7 +223,8 @@ class ViewportWidget(QtInteractor):
 
     def _offer_key(self, event: QKeyEvent, *, pressed: bool) -> bool:
         held = event.modifiers()
-        return self._key_taker(
+        return self._tell(
+            self._key_taker,
             KeyEvent(
                 _key_name(event),
                 event.text(),
@@ -220,7 +232,7 @@ class ViewportWidget(QtInteractor):
                 ctrl=bool(held & Qt.KeyboardModifier.ControlModifier),
                 alt=bool(held & Qt.KeyboardModifier.AltModifier),
                 pressed=pressed,
-            )
+            ),
         )
 
 
