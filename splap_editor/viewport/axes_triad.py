@@ -52,7 +52,7 @@ class AxesTriad:
         """(6, 3) ends +X +Y +Z -X -Y -Z: pixels from the top left, and height towards the viewer in pixels."""
         scale = self.scale
         turned = _ENDS @ projection.view_from_world[:3, :3].T * [1.0, -1.0, 1.0] * _ARM_PX * scale
-        return turned + [projection.width - _MARGIN_PX * scale, _MARGIN_PX * scale, 0.0]
+        return np.add(turned, (projection.width - _MARGIN_PX * scale, _MARGIN_PX * scale, 0.0))
 
     def hit(self, projection: Projection, x: float, y: float) -> NDArray[np.float64] | None:
         """Unit world axis (3,) whose end is under the cursor, the nearer to the viewer of two; None beside all."""

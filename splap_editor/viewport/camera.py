@@ -85,9 +85,9 @@ def orbited(
     view : View
         Where the camera stands.
     yaw_rad, pitch_rad : float
-        Positive yaw turns the scene to the right, positive pitch turns its top towards the viewer.
+        Positive yaw turns the scene to the right, positive pitch its top towards the viewer.
     world_up : (3,) float, optional
-        Turntable: yaw about this axis, stopping short of the poles. None: trackball, both turns about the screen's axes.
+        Turntable: yaw about this axis, stopping short of the poles. None: trackball, about the screen's axes.
     about : (3,) float, optional
         Centre of the turn; it keeps its place on the screen.
     """
@@ -121,17 +121,40 @@ def zoomed(view: View, factor: float, towards: ArrayLike | None = None) -> View:
     )
 
 
-def framed(view: View, center: ArrayLike, radius: float, aspect: float, margin: float = 1.15) -> View:
-    """Keep the direction; a sphere (world units) just fits a picture of this width/height ratio."""
-    half = np.radians(view.angle) / 2.0
-    narrow = min(half, np.arctan(np.tan(half) * aspect))
-    distance = margin * max(radius, 1e-9) / np.sin(narrow)
-    center = np.asarray(center, np.float64)
+def framed(view: View, points: ArrayLike, aspect: float, *, room: float = 0.0, margin: float = 1.12) -> View:
+    """Keep the direction; go where world points just fill the picture.
+
+    Parameters
+    ----------
+    view : View
+        Where the camera stands.
+    points : (N, 3) float
+        At least one.
+    aspect : float
+        Width over height of the picture.
+    room : float
+        World length to keep around the points.
+    margin : float
+        Size of the picture over that of the points in it.
+    """
+    points = np.asarray(points, np.float64)
+    center = (points.min(axis=0) + points.max(axis=0)) / 2.0
+    right, up = np.abs((points - center) @ _screen_axes(view).T).T + room
+    slope = np.tan(np.radians(view.angle) / 2.0)
+    needed = margin * np.maximum(up, right / aspect) / slope
+    if not view.is_parallel:
+        needed = needed - (points - center) @ view.direction
+    distance = max(float(needed.max()), 1e-9)
     return replace(view, focal_point=center, position=center - distance * view.direction)
 
 
+def box_corners(box: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(8, 3) corners of a box ``(low, high)`` (2, 3)."""
+    return np.array([[box[i, 0], box[j, 1], box[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+
+
 def axis_view(view: View, axis: ArrayLike, world_up: ArrayLike) -> View:
-    """Look at the focal point from the side that ``axis`` (3,) points to; seen along ``world_up`` the old up decides."""
+    """Look at the focal point from the side that ``axis`` (3,) points to; along ``world_up`` the old up decides."""
     axis = np.asarray(axis, np.float64) / np.linalg.norm(axis)
     up = np.asarray(world_up, np.float64) / np.linalg.norm(world_up)
     if abs(axis @ up) > 0.999:
@@ -237,15 +260,13 @@ class Camera:
             point = self.projection().on_plane(x, y, view.focal_point, view.direction)
         self.zoom(factor, point)
 
-    def frame(self, points: ArrayLike, margin: float = 1.1) -> View:
-        """View in which the ball around points (N, 3) fills the picture, direction kept; no points: the view as it is."""
+    def frame(self, points: ArrayLike, *, room: float = 0.0) -> View:
+        """View in which points (N, 3) fill the picture, direction kept; no points: the view as it is."""
         points = np.asarray(points, np.float64).reshape(-1, 3)
         if not len(points):
             return self.view
-        center = (points.min(axis=0) + points.max(axis=0)) / 2.0
-        radius = float(np.sqrt(np.max(np.sum((points - center) ** 2, axis=1))))
         width, height = self._renderer.GetSize()
-        return framed(self.view, center, radius, width / max(height, 1), margin)
+        return framed(self.view, points, max(width, 1) / max(height, 1), room=room)
 
     def look_from(self, axis: ArrayLike) -> View:
         """View from the side that a world axis (3,) points to."""
@@ -258,8 +279,7 @@ class Camera:
     def fit_clipping(self, bounds: NDArray[np.float64]) -> None:
         """Set near and far so that a world box, ``((3,) low, (3,) high)``, lies between."""
         view = self.view
-        corners = np.array([[bounds[i, 0], bounds[j, 1], bounds[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
-        depths = (corners - view.position) @ view.direction
+        depths = (box_corners(bounds) - view.position) @ view.direction
         reach = float(np.ptp(depths)) + 1e-6 * view.distance
         far = float(depths.max()) + 0.02 * reach
         near = float(depths.min()) - 0.02 * reach

@@ -123,7 +123,7 @@ class EdgeLines:
 def edges_within_hops(edges: NDArray[np.integer], rows: ArrayLike, n_hops: int, n_splats: int) -> NDArray[np.bool_]:
     """(E,) which edges (E, 2) are reached from the given rows in at most this many steps."""
     reached = np.zeros(n_splats, bool)
-    reached[np.asarray(rows)] = True
+    reached[np.asarray(rows, np.intp)] = True
     chosen = np.zeros(len(edges), bool)
     for _ in range(n_hops):
         step = reached[edges].any(axis=1)

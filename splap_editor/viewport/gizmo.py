@@ -1,53 +1,31 @@
 """The gizmo: which part is under the cursor, and what dragging it does. Pure geometry, drawn by `GizmoActor`."""
 
 from dataclasses import dataclass, field
-from enum import Enum
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from splap_editor.viewport.camera import turn
+from splap_editor.viewport.gizmo_parts import (
+    ARROW_END,
+    ARROW_START,
+    DOT,
+    DOT_RADIUS,
+    PARTS,
+    RING_RADIUS,
+    SCALE_BOX,
+    SCALE_BOX_AT,
+    VIEW_RING,
+    Act,
+    Lock,
+    Part,
+    is_inside,
+    line_of_sight,
+    polyline_distance,
+    ring_points,
+    square_corners,
+)
 from splap_editor.viewport.projection import Projection
-
-
-class Act(Enum):
-    """What a part does."""
-
-    TRANSLATE = "translate"
-    ROTATE = "rotate"
-    SCALE = "scale"
-
-
-class Lock(Enum):
-    """What a part is bound to."""
-
-    AXIS = "axis"
-    PLANE = "plane"
-    VIEW = "view"
-
-
-class Part(NamedTuple):
-    """One handle of the gizmo: an act, bound to an axis, to the plane across it, or to the screen."""
-
-    act: Act
-    lock: Lock
-    axis: int = 2
-
-
-ARROWS = tuple(Part(Act.TRANSLATE, Lock.AXIS, i) for i in range(3))
-SQUARES = tuple(Part(Act.TRANSLATE, Lock.PLANE, i) for i in range(3))
-DOT = Part(Act.TRANSLATE, Lock.VIEW)
-RINGS = tuple(Part(Act.ROTATE, Lock.AXIS, i) for i in range(3))
-VIEW_RING = Part(Act.ROTATE, Lock.VIEW)
-SCALE_BOX = Part(Act.SCALE, Lock.VIEW)
-PARTS = (*ARROWS, *SQUARES, DOT, *RINGS, VIEW_RING, SCALE_BOX)
-
-# Lengths in units of the gizmo's size, the length of an arrow.
-ARROW_START, ARROW_END = 0.2, 1.0
-SQUARE_NEAR, SQUARE_FAR = 0.30, 0.48
-RING_RADIUS, VIEW_RING_RADIUS, SCALE_BOX_AT = 0.86, 1.22, 1.22 / np.sqrt(2.0)
-DOT_RADIUS = 0.085
 
 _FINE = 0.1
 _EDGE_ON = 0.12
@@ -147,7 +125,7 @@ class Gizmo:
         return self.size_px * self.scale * projection.world_per_pixel(self.shown_frame[:3, 3])
 
     def is_part_shown(self, part: Part, projection: Projection) -> bool:
-        """Whether a part can be seen and dragged: not pointing at the viewer, not edge-on; alone while it is dragged."""
+        """Whether a part is seen: not when it points at the viewer or is edge-on; alone while it is dragged."""
         if not self.is_shown or part.act not in self.acts:
             return False
         if self._drag:
@@ -160,7 +138,7 @@ class Gizmo:
     # Hit test -----------------------------------------------------------------------------------------------------
 
     def hit(self, projection: Projection, x: float, y: float) -> Part | None:
-        """Part under the cursor: the nearest in pixels within reach; arrows and dot win over rings, all over squares."""
+        """Part under the cursor, the nearest within reach; arrows and dot win over rings, all of them over squares."""
         if not self.is_shown:
             return None
         cursor = np.array([x, y], np.float64)
@@ -184,12 +162,12 @@ class Gizmo:
             return max(np.linalg.norm(projection.pixel(at) - cursor) - 5.0 * px, 0.0)
         if part.lock is Lock.PLANE:
             corners = projection.pixels(origin + size * square_corners(part.axis) @ axes.T)
-            return 3.0 * px if _is_inside(cursor, corners) else np.inf
+            return 3.0 * px if is_inside(cursor, corners) else np.inf
         if part.act is Act.TRANSLATE:
             ends = origin + np.outer([ARROW_START * size, ARROW_END * size], axes[:, part.axis])
-            return _segment_distances(cursor, projection.pixels(ends))
+            return polyline_distance(cursor, projection.pixels(ends))
         points = ring_points(part, axes, line_of_sight(projection, origin), projection, False)
-        distances = _segment_distances(cursor, projection.pixels(origin + size * points))
+        distances = polyline_distance(cursor, projection.pixels(origin + size * points))
         return distances + 1.0 * px
 
     # Drag ---------------------------------------------------------------------------------------------------------
@@ -236,7 +214,7 @@ class Gizmo:
         return self.delta
 
     def type(self, value: float | None) -> NDArray[np.float64]:
-        """Take a typed number instead of the pointer: world units, degrees or a factor; None goes back to the pointer."""
+        """Take a typed number (world units, degrees, a factor) instead of the pointer; None: the pointer again."""
         self.typed = value
         return self.move(*self._pointer, fine=self._is_fine)
 
@@ -333,50 +311,6 @@ class Gizmo:
         return _about(drag.origin, np.eye(3) + (factor - 1.0) * along)
 
 
-def square_corners(axis: int) -> NDArray[np.float64]:
-    """(4, 3) corners of the plane square across an axis, in gizmo units."""
-    e = np.eye(3)
-    u, v = e[(axis + 1) % 3], e[(axis + 2) % 3]
-    return np.array(
-        [
-            a * u + b * v
-            for a, b in (
-                (SQUARE_NEAR, SQUARE_NEAR),
-                (SQUARE_FAR, SQUARE_NEAR),
-                (SQUARE_FAR, SQUARE_FAR),
-                (SQUARE_NEAR, SQUARE_FAR),
-            )
-        ]
-    )
-
-
-def ring_points(
-    part: Part, axes: NDArray[np.float64], sight: NDArray[np.float64], projection: Projection, is_whole: bool
-):
-    """(K, 3) line of a rotation part about the world's zero, in gizmo units.
-
-    The half of a ring behind its centre is left out unless ``is_whole``, or
-    when the ring faces the viewer (``sight``: unit line of sight).
-    """
-    if part.lock is Lock.VIEW:
-        u, v, radius, is_whole = projection.right, projection.up, VIEW_RING_RADIUS, True
-    else:
-        u, v, radius = axes[:, (part.axis + 1) % 3], axes[:, (part.axis + 2) % 3], RING_RADIUS
-    middle, half = 0.0, np.pi
-    if not is_whole and abs(sight @ np.cross(u, v)) < 0.985:
-        middle, half = np.arctan2(-sight @ v, -sight @ u), np.pi / 2.0
-    angles = np.linspace(middle - half, middle + half, 65)[:, None]
-    return radius * (np.cos(angles) * u + np.sin(angles) * v)
-
-
-def line_of_sight(projection: Projection, point: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(3,) unit vector from the eye to a world point."""
-    if projection.is_parallel:
-        return projection.direction
-    sight = point - projection.eye
-    return sight / np.linalg.norm(sight)
-
-
 def _about(point: NDArray[np.float64], A: NDArray[np.float64]) -> NDArray[np.float64]:
     T = np.eye(4)
     T[:3, :3] = A
@@ -388,21 +322,3 @@ def _across(axis: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.
     u = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     u /= np.linalg.norm(u)
     return u, np.cross(axis, u)
-
-
-def _segment_distances(cursor: NDArray[np.float64], line: NDArray[np.float64]) -> float:
-    """Least distance of the cursor to a polyline (K, 2) in pixels."""
-    a, b = line[:-1], line[1:]
-    edge = b - a
-    length = np.maximum(np.einsum("ij,ij->i", edge, edge), 1e-12)
-    t = np.clip(np.einsum("ij,ij->i", cursor - a, edge) / length, 0.0, 1.0)
-    distances = np.linalg.norm(cursor - a - t[:, None] * edge, axis=1)
-    return float(np.nanmin(distances)) if np.isfinite(distances).any() else np.inf
-
-
-def _is_inside(cursor: NDArray[np.float64], corners: NDArray[np.float64]) -> bool:
-    """Inside a convex polygon (K, 2), either way round."""
-    edge = np.roll(corners, -1, axis=0) - corners
-    arm = cursor - corners
-    side = edge[:, 0] * arm[:, 1] - edge[:, 1] * arm[:, 0]
-    return bool((side >= 0).all() or (side <= 0).all())

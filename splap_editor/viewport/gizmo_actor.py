@@ -8,7 +8,8 @@ from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
 from vtkmodules.vtkCommonMath import vtkMatrix4x4
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkRenderer
 
-from splap_editor.viewport.gizmo import (
+from splap_editor.viewport.gizmo import Gizmo
+from splap_editor.viewport.gizmo_parts import (
     ARROW_END,
     ARROW_START,
     DOT_RADIUS,
@@ -16,7 +17,6 @@ from splap_editor.viewport.gizmo import (
     SCALE_BOX,
     SCALE_BOX_AT,
     Act,
-    Gizmo,
     Lock,
     Part,
     line_of_sight,

@@ -46,7 +46,7 @@ class Markers:
         self._renderer.RemoveActor(self.actor)
 
     def show(self, points: ArrayLike, colors: ArrayLike, active: int | None = None) -> None:
-        """Put a dot at each world point (N, 3) in its colour (N, 3), 0..1; the ``active`` one is larger and white-rimmed."""
+        """Put a dot at each world point (N, 3) in its colour (N, 3), 0..1; the ``active`` one is rimmed white."""
         points = np.asarray(points, np.float64).reshape(-1, 3)
         rgb = np.asarray(colors, np.float64).reshape(-1, 3)
         if len(rgb) != len(points):

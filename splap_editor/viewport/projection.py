@@ -6,6 +6,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+# Planes are followed so many times farther than their origin, no farther.
+_HORIZON = 50.0
+
 
 @dataclass(frozen=True, eq=False)
 class Projection:
@@ -93,7 +96,7 @@ class Projection:
         return scale if self.is_parallel else scale * abs(float(self.depths(point)[0]))
 
     def on_line(self, x: float, y: float, origin: ArrayLike, axis: ArrayLike) -> float:
-        """Parameter ``t`` of the point ``origin + t axis`` nearest to the ray through a pixel; 0 when they are parallel."""
+        """Parameter ``t`` of the point ``origin + t axis`` nearest to the ray through a pixel; 0 if parallel."""
         start, direction = self.ray(x, y)
         normal = np.cross(axis, direction)
         square = normal @ normal
@@ -102,9 +105,20 @@ class Projection:
         return float(np.cross(start - origin, direction) @ normal / square)
 
     def on_plane(self, x: float, y: float, origin: ArrayLike, normal: ArrayLike) -> NDArray[np.float64]:
-        """(3,) point where the ray through a pixel meets a plane; ``origin`` itself when the plane is seen edge-on."""
+        """(3,) point where the ray through a pixel meets a plane.
+
+        ``origin`` itself when the plane is seen edge-on. Past the plane's
+        horizon, where they meet behind the eye, it is the point of the plane
+        nearest to one far out on the ray.
+        """
         start, direction = self.ray(x, y)
-        slope = direction @ np.asarray(normal)
-        if abs(slope) < 1e-4 * np.linalg.norm(normal):
-            return np.array(origin, np.float64)
-        return start + direction * ((np.asarray(origin) - start) @ normal / slope)
+        origin, normal = np.asarray(origin, np.float64), np.asarray(normal) / np.linalg.norm(normal)
+        slope = direction @ normal
+        if abs(slope) < 1e-4:
+            return origin.copy()
+        farthest = _HORIZON * np.linalg.norm(origin - start)
+        t = (origin - start) @ normal / slope
+        if not self.is_parallel and not 0.0 <= t <= farthest:
+            far = start + direction * farthest
+            return far - normal * ((far - origin) @ normal)
+        return start + direction * t

@@ -133,7 +133,7 @@ def _near_path(screen, path, radius, inside):
 
 
 def in_brush(screen: NDArray[np.float32], path: ArrayLike, radius_px: float) -> NDArray[np.bool_]:
-    """(N,) whether each of the `screen_points` lies within a radius of a stroke, a polyline (K, 2) of pixels, K >= 1."""
+    """(N,) whether each of the `screen_points` lies within a radius of a stroke (K, 2) of pixels, K >= 1."""
     path = np.ascontiguousarray(np.atleast_2d(path), np.float64)
     if path.ndim != 2 or path.shape[1] != 2 or not len(path):
         raise ValueError(f"path must have shape (K, 2) with K >= 1, got {path.shape}")

@@ -9,7 +9,7 @@ from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow
 from splap_editor.viewport.camera import Camera
 from splap_editor.viewport.depth_order import depth_order
 from splap_editor.viewport.splat_actor import DisplayMode
-from splap_editor.viewport.viewport import Compare, Viewport
+from splap_editor.viewport.viewport import Viewport
 
 LARGEST_PX = 16384
 _LARGEST_SMOOTHED_PX = 4096
@@ -50,7 +50,7 @@ def screenshot(viewport: Viewport, width: int, height: int, *, is_transparent: b
     """
     if not (1 <= width <= LARGEST_PX and 1 <= height <= LARGEST_PX):
         raise ValueError(f"a picture must have 1 to {LARGEST_PX} pixels a side, got {width} x {height}")
-    is_smoothed = viewport.mode is not DisplayMode.SPLATS and max(width, height) <= _LARGEST_SMOOTHED_PX
+    is_smoothed = viewport.splats.mode is not DisplayMode.SPLATS and max(width, height) <= _LARGEST_SMOOTHED_PX
     samples = 2 if is_smoothed else 1
     pixels = _drawn(viewport, samples * width, samples * height, samples, is_transparent).astype(np.float32)
     pixels = pixels.reshape(height, samples, width, samples, 4).mean(axis=(1, 3))
@@ -82,18 +82,18 @@ def _drawn(viewport: Viewport, width: int, height: int, samples: int, is_transpa
     camera = Camera(renderer)
     camera.view = viewport.camera.view
     boxes = []
-    for actor in viewport.shown_actors():
+    for actor in viewport.splats.shown_actors():
         twin = actor.twin(size_in_pixels=samples)
         twin.set_viewport_size(width, height)
         renderer.AddActor(twin.actor)
         boxes.append(twin.bounds())
-        if viewport.mode is DisplayMode.SPLATS:
+        if viewport.splats.mode is DisplayMode.SPLATS:
             twin.set_order(depth_order(twin.means, camera.projection().direction))
-        if viewport.edges.n_edges and (actor is viewport.splats or viewport.compare is Compare.ORIGINAL):
-            edges = viewport.edges.twin(twin, renderer, samples)
+        if viewport.splats.edges.n_edges and (actor is viewport.splats.shown):
+            edges = viewport.splats.edges.twin(twin, renderer, samples)
     if boxes:
         camera.fit_clipping(np.array([np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]]))
-        if viewport.edges.n_edges:
+        if viewport.splats.edges.n_edges:
             edges.refresh(camera.projection())
     window.Render()
     pixels = window_pixels(window)

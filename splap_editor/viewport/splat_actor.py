@@ -118,6 +118,10 @@ class SplatActor:
         self._build()
         self.shape[:, 1] = glyphs.cutoffs
         reaches = np.linalg.norm(np.hstack([glyphs.axes_u, glyphs.axes_v]), axis=1) * glyphs.cutoffs
+        self.reach = float(np.median(reaches)) if n else 0.0
+        # Far floaters must not stretch what counts as the size of the scene.
+        core = np.ptp(np.percentile(glyphs.means, [1, 99], axis=0), axis=0) if n else np.zeros(3)
+        self.extent = max(float(np.linalg.norm(core)) + 2.0 * self.reach, 1e-9)
         self._room = float(reaches.max(initial=0.0)) + 1e-6 * self.extent
         self.set_geometry(glyphs.means, glyphs.axes_u, glyphs.axes_v, glyphs.thickness)
         self.set_colors(colors)
@@ -238,6 +242,11 @@ class SplatActor:
     def cutoffs(self) -> NDArray[np.float32]:
         """(N,) radius in standard deviations where each splat ends."""
         return self.shape[:, 1]
+
+    @property
+    def base_colors(self) -> NDArray[np.uint8]:
+        """(N, 4) colours and opacities without tints."""
+        return self._untinted
 
     @property
     def cut_byte(self) -> int:

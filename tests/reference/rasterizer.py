@@ -46,7 +46,7 @@ def splats_picture(projection: Projection, means, u, v, thickness, cutoffs, rgba
 
 
 def ellipses_picture(projection: Projection, means, u, v, cutoffs, rgb, background):
-    """Nearest occupancy ellipse of each pixel, unlit and without rims; colours (H, W, 3) and rows (H, W), -1 for none."""
+    """Nearest occupancy ellipse of each pixel, unlit, no rims; colours (H, W, 3) and rows (H, W), -1 for none."""
     xs, ys = _pixel_grid(projection)
     depth = np.full(xs.shape, np.inf)
     rows = np.full(xs.shape, -1)
