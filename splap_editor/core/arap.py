@@ -10,6 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from splap_editor.core.arap_coarse import CoarseArap
 from splap_editor.core.arap_minimiser import ArapMinimiser, approached
 from splap_editor.core.arap_problem import FREE, PIN, ArapProblem, Constraints, Pose
 from splap_editor.core.arap_scene import ArapScene
@@ -18,11 +19,13 @@ from splap_editor.core.handle_motion import turns_left_open
 from splap_editor.core.libigl_arap import libigl_arap, triangle_components
 from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.rigid_parts import LooseParts, RigidComponents
-from splap_editor.core.rotation_fit import nearest_rotations
 from splap_editor.core.splat_graph import SplatGraph
 
 _MAX_ITERATIONS = 1000
 """Accelerated iterations after which a solve gives what it has, with its honest residual."""
+
+_COARSE_TOLERANCE = 1e-3
+"""How well the coarse model is settled before the full one starts from it, in units of the scene scale."""
 
 _DRAG_ITERATIONS = 3
 """Accelerated iterations a frame."""
@@ -136,7 +139,6 @@ class ArapDeformer:
         self._rigid = RigidComponents(self.rest, self._constraints, self.scene_scale)
         self._loose = LooseParts(self.rest, self._constraints)
         self._triangles = triangles
-        self._moving = handles.labels >= 0
         self._dragged: ArapMinimiser | None = None
         progress(1.0)
 
@@ -160,6 +162,11 @@ class ArapDeformer:
     @cached_property
     def _problem(self) -> ArapProblem:
         return ArapProblem(self.rest, self.scene.W, self._constraints, self._beta)
+
+    @cached_property
+    def _coarse(self) -> CoarseArap | None:
+        model = self.scene.coarse
+        return None if model is None else CoarseArap(model, self._constraints, self.scene.graph, self._beta)
 
     @cached_property
     def _rest_pose(self) -> Pose:
@@ -189,13 +196,17 @@ class ArapDeformer:
         if self._rigid.follow(transforms, pose):
             self._loose.follow(pose)
             return Deformation(pose.positions, pose.rotations)
+        problem = self._problem if self._coarse is None else self._coarse.problem
         if self._dragged is None:
-            self._dragged = ArapMinimiser(self._problem, Pose.of_rest(self._problem.rest))
-        self._problem.hold(self._dragged.pose, transforms)
+            self._dragged = ArapMinimiser(problem, Pose.of_rest(problem.rest))
+        problem.hold(self._dragged.pose, transforms)
         self._dragged.restart()
         for _ in range(_DRAG_ITERATIONS):
             self._dragged.iterate()
-        self._problem.spread(self._dragged.pose, pose)
+        if self._coarse is None:
+            problem.spread(self._dragged.pose, pose)
+        else:
+            self._coarse.spread(self._dragged.pose, transforms, self.rest, pose)
         return self._finished(pose, transforms, np.inf, _DRAG_ITERATIONS)
 
     def solve(
@@ -232,19 +243,29 @@ class ArapDeformer:
         if self._rigid.follow(transforms, pose):
             self._loose.follow(pose)
             return Deformation(pose.positions, pose.rotations)
-        problem = self._problem
-        report = _Report(part_of(progress, 0.0, 0.3))
-        minimiser = approached(problem, self.handles, transforms, self.scene_scale, report)
+        minimiser = self._started(transforms, part_of(progress, 0.0, 0.3))
 
         def settled(residual: float) -> Deformation:
             whole = self._held_pose(transforms)
-            problem.spread(minimiser.pose, whole)
+            self._problem.spread(minimiser.pose, whole)
             return self._finished(whole, transforms, residual, minimiser.n_iterations)
 
         tolerance = self.options.tolerance * self.scene_scale
         report = _Report(part_of(progress, 0.3, 1.0), minimiser, tolerance, shown and (lambda: shown(settled(np.inf))))
         residual = minimiser.settle(tolerance, _MAX_ITERATIONS, report)
         return settled(residual / self.scene_scale)
+
+    def _started(self, transforms: NDArray[np.float64], progress: Progress) -> ArapMinimiser:
+        """A minimiser of the full problem, close to its minimum: from the coarse one where there is one."""
+        report = _Report(progress)
+        if self._coarse is None:
+            return approached(self._problem, self.handles, transforms, self.scene_scale, report)
+        coarse = approached(self._coarse.problem, self.handles, transforms, self.scene_scale, report)
+        coarse.settle(_COARSE_TOLERANCE * self.scene_scale, _MAX_ITERATIONS, report)
+        whole = self._held_pose(transforms)
+        self._coarse.spread(coarse.pose, transforms, self.rest, whole)
+        nodes = self._problem.nodes
+        return ArapMinimiser(self._problem, Pose(whole.positions[nodes], whole.rotations[nodes]))
 
     def _by_alternation(self, transforms: NDArray[np.float64], pose: Pose, progress: Progress) -> Deformation:
         """Plain local/global iterations from rest with the held nodes moved."""
@@ -283,10 +304,7 @@ class ArapDeformer:
     def _held_pose(self, transforms: NDArray[np.float64]) -> Pose:
         """Every node at rest but the handles' own, which are in place."""
         pose = self._rest_pose.copy()
-        nodes, labels = self.handles.indices[self._moving], self.handles.labels[self._moving]
-        linear = transforms[:, :3, :3]
-        pose.positions[nodes] = (linear[labels] @ self.rest[nodes][:, :, None])[:, :, 0] + transforms[labels, :3, 3]
-        pose.rotations[nodes] = nearest_rotations(linear)[labels]
+        self._constraints.hold(pose, self.rest, transforms)
         return pose
 
     def _finished(self, pose: Pose, transforms: NDArray[np.float64], residual: float, n_iterations: int) -> Deformation:

@@ -55,7 +55,7 @@ def fit_local_rotations(indptr, indices, weights, rest, positions, turn_rows, be
 
 @nb.njit(nogil=True, cache=True, fastmath=True)
 def write_global_rhs(indptr, indices, weights, rest, positions, rotations, free_rows, is_free, rhs):
-    """Right-hand side of the global step ``Σ_j w_ij (x_i - x_j) = ½ Σ_j w_ij (R_i + R_j) e_ij``, held x_j moved over."""
+    """Right-hand side of the global step ``Σ_j w_ij (x_i - x_j) = ½ Σ_j w_ij (R_i + R_j) e_ij``, free x_j kept left."""
     for k in range(free_rows.size):
         i = free_rows[k]
         b0 = b1 = b2 = 0.0

@@ -65,6 +65,28 @@ class Constraints:
         """(n,) nodes to be placed: neither held nor loose."""
         return ~self.held & ~self.loose
 
+    def hold(self, pose: "Pose", rest: NDArray[np.float64], transforms: NDArray[np.float64]) -> None:
+        """Move the handles' nodes of a pose of all nodes; pins are at rest already.
+
+        Parameters
+        ----------
+        pose : Pose
+            Of all nodes, changed in place.
+        rest : (n, 3) float64
+            Rest positions.
+        transforms : (H, 4, 4) float64
+            World transform of each handle; nodes turn by the rotation nearest to its linear part.
+        """
+        nodes, labels = self._moved
+        linear = transforms[:, :3, :3]
+        pose.positions[nodes] = (linear[labels] @ rest[nodes][:, :, None])[:, :, 0] + transforms[labels, :3, 3]
+        pose.rotations[nodes] = nearest_rotations(linear)[labels]
+
+    @cached_property
+    def _moved(self) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+        nodes = np.flatnonzero(self.labels >= 0)
+        return nodes, self.labels[nodes]
+
 
 @dataclass(eq=False)
 class Pose:
@@ -108,7 +130,7 @@ class ArapProblem:
     """
 
     def __init__(self, rest: NDArray[np.float64], W: sp.csr_matrix, constraints: Constraints, beta: float) -> None:
-        held, clamped = constraints.held, constraints.clamped
+        clamped = constraints.clamped
         free = constraints.free
         inner = free.copy()
         inner[W[free].indices] = True
@@ -132,8 +154,9 @@ class ArapProblem:
         self.turn_rows = np.flatnonzero(has_energy & ~fixed)
         self._turn_index = np.full(len(self.nodes), -1, np.int32)
         self._turn_index[self.turn_rows] = np.arange(len(self.turn_rows), dtype=np.int32)
-        self._held_rows = np.flatnonzero(held[self.nodes])
-        self._held_labels = constraints.labels[self.nodes[self._held_rows]]
+        self._constraints = Constraints(
+            constraints.labels[self.nodes], clamped[self.nodes], constraints.component[self.nodes]
+        )
         self._rhs = np.empty((len(self.free_rows), 3))
 
     @property
@@ -169,11 +192,7 @@ class ArapProblem:
 
     def hold(self, pose: Pose, transforms: NDArray[np.float64]) -> None:
         """Move the held rows by their handles' ``transforms``, (H, 4, 4), and turn them by the polar factors."""
-        padded = np.concatenate([transforms, np.eye(4)[None]])
-        maps = padded[self._held_labels]
-        points = self.rest[self._held_rows]
-        pose.positions[self._held_rows] = np.einsum("cij,cj->ci", maps[:, :3, :3], points) + maps[:, :3, 3]
-        pose.rotations[self._held_rows] = nearest_rotations(padded[:, :3, :3])[self._held_labels]
+        self._constraints.hold(pose, self.rest, transforms)
 
     def spread(self, pose: Pose, whole: Pose) -> None:
         """Write the free rows' positions and the turning rows' rotations to a pose of all nodes."""
