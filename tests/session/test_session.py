@@ -263,6 +263,8 @@ def test_a_second_file_cancels_the_preparing_of_the_first(main, session, monkeyp
 
 
 def test_a_handle_placed_on_a_moved_part_moves_nothing(main, opened):
+    # A second handle frees what lies around it, so all is free from the start.
+    opened.change_edit(replace(opened.scene.edit, free_radius=None), "Free everything")
     bent(main, opened)
     scene = opened.scene
     before = scene.kernels.means.copy()
@@ -274,7 +276,7 @@ def test_a_handle_placed_on_a_moved_part_moves_nothing(main, opened):
     main.run_until(lambda: opened.state == "settled")
     moved = np.linalg.norm(scene.kernels.means - before, axis=1)
     # Holding a disc rigidly where it bent a little shifts it by a small share of the bend.
-    assert moved.max() < 0.02 * scene.ellipses.scene_scale
+    assert moved.max() < 0.01 * scene.ellipses.scene_scale
 
 
 def test_a_disabled_handle_lets_go(main, opened):

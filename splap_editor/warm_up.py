@@ -1,0 +1,106 @@
+"""Compiles every loop of the engine into the cache on disk, in a process of its own.
+
+Compiling holds Python's lock for half a minute in all; done here, the window of another process stays alive
+meanwhile. Two processes may do it at once: entries are written whole or not at all.
+"""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numba
+import numpy as np
+
+import splap_editor
+from splap_editor.core.handle_nodes import Region
+from splap_editor.core.kernel_adaptation import adapted_splats
+from splap_editor.core.progress import Progress, no_progress
+from splap_editor.core.spherical_harmonics import view_colors
+from splap_editor.core.splat_graph import GraphOptions
+from splap_editor.core.splats import Splats
+from splap_editor.session.cache import default_cache_folder
+from splap_editor.session.edit import Edit, Handle, Pose
+from splap_editor.session.pipeline import deformer_of, handles_of, kernels_of, surface_of
+
+
+def is_warm() -> bool:
+    """Whether the loops of this version, for this Python and compiler, have been compiled before."""
+    return _stamp().exists()
+
+
+def warm_up(progress: Progress = no_progress) -> None:
+    """Run every stage on a sheet of splats, so that all loops are compiled and kept."""
+    splats = _sheet()
+    surface = surface_of(splats, GraphOptions())
+    progress(0.4)
+    surface_of(splats, GraphOptions(rule="paper"))
+    progress(0.5)
+    _ = surface.arap_scene.coarse
+    center = surface.ellipses.centers[0]
+    handles = (Handle(1, "", "#ffffff", Region(center, 0.1), Pose((0.0, 0.0, 0.3), (0.9, 0.1, 0.2, 0.3))),)
+    pins = (Region(surface.ellipses.centers[-1], 0.1),)
+    for number, method in enumerate(("arap", "bbw")):
+        edit = Edit(handles, pins, method, free_radius=None)
+        deformer = deformer_of(surface, edit, handles_of(surface, edit), progress=no_progress)
+        deformer.drag(edit.transforms)
+        kernels = kernels_of(surface, edit, deformer.solve(edit.transforms))
+        progress(0.7 + 0.1 * number)
+    adapted_splats(splats, kernels)
+    view_colors(splats.sh0, splats.shN, kernels.means, kernels.rotations, np.zeros(3))
+    _view(splats, kernels.means_f32)
+    _stamp().parent.mkdir(parents=True, exist_ok=True)
+    _stamp().touch()
+    progress(1.0)
+
+
+def warm_up_elsewhere() -> subprocess.Popen:
+    """Start `warm_up` in a process of its own; its exit code is 0 when all is compiled."""
+    return subprocess.Popen([sys.executable, "-m", "splap_editor.warm_up"], stdin=subprocess.DEVNULL)
+
+
+def _stamp() -> Path:
+    versions = f"{splap_editor.__version__}-py{sys.version_info.major}.{sys.version_info.minor}-numba{numba.__version__}"
+    return default_cache_folder() / f"compiled-{versions}"
+
+
+def _sheet(n: int = 64) -> Splats:
+    """A wavy sheet of n² overlapping splats, large enough for the coarse model of a drag."""
+    x, y = (axis.ravel() for axis in np.meshgrid(np.linspace(-1, 1, n), np.linspace(-1, 1, n)))
+    rng = np.random.default_rng(0)
+    x, y = x + rng.normal(0, 0.1 / n, n * n), y + rng.normal(0, 0.1 / n, n * n)
+    return Splats(
+        means=np.stack([x, y, 0.1 * np.sin(3 * x)], 1).astype(np.float32),
+        log_scales=np.full((n * n, 2), np.log(1.0 / n), np.float32),
+        quats=np.tile(np.array([1.0, 0.0, 0.0, 0.0], np.float32), (n * n, 1)),
+        logit_opacities=np.full(n * n, 3.0, np.float32),
+        sh0=np.zeros((n * n, 3), np.float32),
+        shN=np.zeros((n * n, 15, 3), np.float32),
+    )
+
+
+def _view(splats: Splats, means: np.ndarray) -> None:
+    """Compile what picks and sorts."""
+    import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - registers the OpenGL implementations
+
+    from splap_editor.viewport.depth_order import depth_order
+    from splap_editor.viewport.glyphs import base_colors, splat_glyphs
+    from splap_editor.viewport.picking import surface_hit
+    from splap_editor.viewport.projection import Projection
+    from splap_editor.viewport.regions import in_brush, in_lasso, in_rectangle, screen_points, visible_only
+    from splap_editor.viewport.splat_actor import SplatActor
+
+    depth_order(means, np.array([0.0, 0.0, -1.0], np.float32))
+    actor = SplatActor(splat_glyphs(splats), base_colors(splats))
+    view = np.eye(4)
+    view[2, 3] = -3.0
+    projection = Projection(view, np.diag([1.0, 1.0, -1.0, 1.0]), 64, 64)
+    surface_hit(actor, projection, 32.0, 32.0)
+    screen = screen_points(actor, projection)
+    square = [(8.0, 8.0), (56.0, 8.0), (56.0, 56.0), (8.0, 56.0)]
+    in_rectangle(screen, 8.0, 8.0, 56.0, 56.0)
+    in_brush(screen, square, 4.0)
+    visible_only(actor, projection, screen, in_lasso(screen, square))
+
+
+if __name__ == "__main__":
+    warm_up()
