@@ -25,7 +25,25 @@ _HALF_ROOT_3 = 0.5 * math.sqrt(3.0)
 
 
 class KernelArrays(NamedTuple):
-    """The arrays of `AdaptedKernels`, as compiled loops write them; see there."""
+    """What the compiled loops write.
+
+    In carried order, that of `KernelBinding.order`, so that all but the drawn arrays are written in one sweep.
+
+    Parameters
+    ----------
+    means : (N, 3) float64
+        Deformed centres.
+    rotations : (N, 3, 3) float64
+        Polar factors, rest → deformed.
+    growths, twists : (N, 2) float64
+        Growth of the in-plane axes; cosine and sine of their turn within the plane.
+    changed : (N,) bool
+        Whether anything that carries the splat has moved.
+    means_f32 : (N, 3) float32
+        Centres to draw, in file order.
+    axes_f32 : (N, 2, 3) float32
+        In-plane axes to draw, in file order.
+    """
 
     means: NDArray[np.float64]
     rotations: NDArray[np.float64]
@@ -39,17 +57,17 @@ class KernelArrays(NamedTuple):
 @nb.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract"})
 def find_moved(rest, positions, rotations, still, moved):
     """Mark the nodes that are displaced by more than ``still`` along an axis, or turned."""
-    for i in range(len(rest)):
+    for i in range(len(positions)):
         moved[i] = _has_moved(i, rest, positions, rotations, still)
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract"})
 def find_motions(stencils, inverse_moments, dampings, rest, positions, rotations, still, moved, motions):
-    """Affine map x ↦ A x + b of each node's neighbourhood, as the nine entries of A by rows and then b.
+    """Affine map x ↦ A x + b of each node's neighbourhood, as the columns of A and then b.
 
     A node that `find_moved` would not mark has the identity.
     """
-    for i in range(len(rest)):
+    for i in range(len(positions)):
         moved[i] = _has_moved(i, rest, positions, rotations, still)
         if not moved[i]:
             for k in range(12):
@@ -60,7 +78,7 @@ def find_motions(stencils, inverse_moments, dampings, rest, positions, rotations
         damping = dampings[i]
         if damping == 0.0:
             for k in range(9):
-                motions[i, k] = rotations[i, k // 3, k % 3]
+                motions[i, k] = rotations[i, k % 3, k // 3]
         else:
             xx = xy = xz = yx = yy = yz = zx = zy = zz = square = 0.0
             for k in range(stencils.shape[1]):
@@ -84,24 +102,17 @@ def find_motions(stencils, inverse_moments, dampings, rest, positions, rotations
             zx, zy, zz = zx + pull * rotations[i, 2, 0], zy + pull * rotations[i, 2, 1], zz + pull * rotations[i, 2, 2]
             ixx, ixy, ixz = inverse_moments[i, 0], inverse_moments[i, 1], inverse_moments[i, 2]
             iyy, iyz, izz = inverse_moments[i, 3], inverse_moments[i, 4], inverse_moments[i, 5]
-            motions[i, 0], motions[i, 1], motions[i, 2] = (
-                xx * ixx + xy * ixy + xz * ixz,
-                xx * ixy + xy * iyy + xz * iyz,
-                xx * ixz + xy * iyz + xz * izz,
-            )
-            motions[i, 3], motions[i, 4], motions[i, 5] = (
-                yx * ixx + yy * ixy + yz * ixz,
-                yx * ixy + yy * iyy + yz * iyz,
-                yx * ixz + yy * iyz + yz * izz,
-            )
-            motions[i, 6], motions[i, 7], motions[i, 8] = (
-                zx * ixx + zy * ixy + zz * ixz,
-                zx * ixy + zy * iyy + zz * iyz,
-                zx * ixz + zy * iyz + zz * izz,
-            )
-        motions[i, 9] = qx - (motions[i, 0] * px + motions[i, 1] * py + motions[i, 2] * pz)
-        motions[i, 10] = qy - (motions[i, 3] * px + motions[i, 4] * py + motions[i, 5] * pz)
-        motions[i, 11] = qz - (motions[i, 6] * px + motions[i, 7] * py + motions[i, 8] * pz)
+            motions[i, 0] = xx * ixx + xy * ixy + xz * ixz
+            motions[i, 1] = yx * ixx + yy * ixy + yz * ixz
+            motions[i, 2] = zx * ixx + zy * ixy + zz * ixz
+            motions[i, 3] = xx * ixy + xy * iyy + xz * iyz
+            motions[i, 4] = yx * ixy + yy * iyy + yz * iyz
+            motions[i, 5] = zx * ixy + zy * iyy + zz * iyz
+            motions[i, 6] = xx * ixz + xy * iyz + xz * izz
+            motions[i, 7] = yx * ixz + yy * iyz + yz * izz
+            motions[i, 8] = zx * ixz + zy * iyz + zz * izz
+        for a in range(3):
+            motions[i, 9 + a] = positions[i, a] - (motions[i, a] * px + motions[i, 3 + a] * py + motions[i, 6 + a] * pz)
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract"})
@@ -111,6 +122,7 @@ def carry_triangles(lo, hi, carriers, weights, centers, semi_axes, motions, move
     Row i - lo of ``images`` becomes centre, major and minor conjugate half-diameter of the moved triangle's Steiner
     circumellipse; ``carried`` tells whether any carrier has moved.
     """
+    blend = np.empty(12)
     for i in range(lo, hi):
         any_moved = False
         for k in range(9):
@@ -126,12 +138,14 @@ def carry_triangles(lo, hi, carriers, weights, centers, semi_axes, motions, move
             px = centers[i, 0] + along * semi_axes[i, 0, 0] + across * semi_axes[i, 1, 0]
             py = centers[i, 1] + along * semi_axes[i, 0, 1] + across * semi_axes[i, 1, 1]
             pz = centers[i, 2] + along * semi_axes[i, 0, 2] + across * semi_axes[i, 1, 2]
-            x = y = z = 0.0
-            for k in range(3 * c, 3 * c + 3):
-                j, w = carriers[i, k], weights[i, k]
-                x += w * (motions[j, 0] * px + motions[j, 1] * py + motions[j, 2] * pz + motions[j, 9])
-                y += w * (motions[j, 3] * px + motions[j, 4] * py + motions[j, 5] * pz + motions[j, 10])
-                z += w * (motions[j, 6] * px + motions[j, 7] * py + motions[j, 8] * pz + motions[j, 11])
+            k = 3 * c
+            j0, j1, j2 = carriers[i, k], carriers[i, k + 1], carriers[i, k + 2]
+            w0, w1, w2 = weights[i, k], weights[i, k + 1], weights[i, k + 2]
+            for k in range(12):
+                blend[k] = w0 * motions[j0, k] + w1 * motions[j1, k] + w2 * motions[j2, k]
+            x = blend[0] * px + blend[3] * py + blend[6] * pz + blend[9]
+            y = blend[1] * px + blend[4] * py + blend[7] * pz + blend[10]
+            z = blend[2] * px + blend[5] * py + blend[8] * pz + blend[11]
             # The affine map from the reference triangle to the moved one, applied to its centre, v1 and v2.
             third = 1.0 / 3.0
             mx, my, mz = mx + third * x, my + third * y, mz + third * z
@@ -203,12 +217,12 @@ def write_kernels(lo, hi, carried, images, rest, rotations, out):
     stretched ellipse are named after the rest axes they are within 45° of.
     """
     # Unpacked once: each access to an array of a tuple counts a reference.
-    rest_means, rest_axes_f32, rows, _, semi_axes, lengths, cutoffs = rest
+    rest_means, rest_axes_f32, order, semi_axes, lengths, cutoffs = rest
     means, turns, growths, twists, changed, means_f32, axes_f32 = out
     for i in range(lo, hi):
-        row = rows[i]
+        row = order[i]
         if not carried[i - lo]:
-            _write_rest(row, rest_means, rest_axes_f32, means, turns, growths, twists, changed, means_f32, axes_f32)
+            _write_rest(i, row, rest_means, rest_axes_f32, means, turns, growths, twists, changed, means_f32, axes_f32)
             continue
         length1, length2 = lengths[i, 0], lengths[i, 1]
         per1, per2 = 1.0 / length1, 1.0 / length2
@@ -240,49 +254,49 @@ def write_kernels(lo, hi, carried, images, rest, rotations, out):
         per_sigma = 1.0 / cutoffs[i]
         sigma1, sigma2 = per_sigma * growth1 * length1, per_sigma * growth2 * length2
         for a in range(3):
-            means[row, a] = means_f32[row, a] = images[i - lo, a]
+            means[i, a] = means_f32[row, a] = images[i - lo, a]
             axes_f32[row, 0, a] = sigma1 * (cosine * q1[a] + sine * q2[a])
             axes_f32[row, 1, a] = sigma2 * (cosine * q2[a] - sine * q1[a])
             for b in range(3):
-                turns[row, a, b] = q1[a] * e1[b] + q2[a] * e2[b] + q3[a] * e3[b]
-        growths[row, 0], growths[row, 1] = growth1, growth2
-        twists[row, 0], twists[row, 1] = cosine, sine
-        changed[row] = True
+                turns[i, a, b] = q1[a] * e1[b] + q2[a] * e2[b] + q3[a] * e3[b]
+        growths[i, 0], growths[i, 1] = growth1, growth2
+        twists[i, 0], twists[i, 1] = cosine, sine
+        changed[i] = True
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract"})
-def adapt_inert(inert_rows, carriers, weights, rest, positions, rotations, moved, out):
+def adapt_inert(carriers, weights, rest, positions, rotations, moved, out):
     """Move and turn the splats outside the graph with the blended rigid motion of their carriers."""
-    rest_means, rest_axes_f32, _, centers, _, _, _ = rest
+    rest_means, rest_axes_f32, order, _, _, _ = rest
     means, turns, growths, twists, changed, means_f32, axes_f32 = out
     blend = np.empty((3, 3))
-    for r in range(len(inert_rows)):
-        row = inert_rows[r]
-        _write_rest(row, rest_means, rest_axes_f32, means, turns, growths, twists, changed, means_f32, axes_f32)
+    for r in range(len(carriers)):
+        i = len(positions) + r
+        row = order[i]
+        _write_rest(i, row, rest_means, rest_axes_f32, means, turns, growths, twists, changed, means_f32, axes_f32)
         for k in range(carriers.shape[1]):
-            if weights[r, k] > 0.0 and moved[carriers[r, k]]:
-                changed[row] = True
-        if not changed[row]:
+            changed[i] |= weights[r, k] > 0.0 and moved[carriers[r, k]]
+        if not changed[i]:
             continue
         blend[:] = 0.0
         for a in range(3):
-            means[row, a] = 0.0
+            means[i, a] = 0.0
             for k in range(carriers.shape[1]):
                 j, w = carriers[r, k], weights[r, k]
                 value = positions[j, a]
                 for b in range(3):
-                    value += rotations[j, a, b] * (rest_means[row, b] - centers[j, b])
+                    value += rotations[j, a, b] * (rest_means[i, b] - rest_means[j, b])
                     blend[a, b] += w * rotations[j, a, b]
-                means[row, a] += w * value
-            means_f32[row, a] = means[row, a]
+                means[i, a] += w * value
+            means_f32[row, a] = means[i, a]
         B = blend
         w, x, y, z = rotation_quaternion(
             B[0, 0], B[0, 1], B[0, 2], B[1, 0], B[1, 1], B[1, 2], B[2, 0], B[2, 1], B[2, 2]
         )
-        write_rotation(turns, row, w, x, y, z)
+        write_rotation(turns, i, w, x, y, z)
         for axis in range(2):
-            u = (rest_axes_f32[row, axis, 0], rest_axes_f32[row, axis, 1], rest_axes_f32[row, axis, 2])
-            axes_f32[row, axis, 0], axes_f32[row, axis, 1], axes_f32[row, axis, 2] = _turned(turns, row, u)
+            u = (rest_axes_f32[i, axis, 0], rest_axes_f32[i, axis, 1], rest_axes_f32[i, axis, 2])
+            axes_f32[row, axis, 0], axes_f32[row, axis, 1], axes_f32[row, axis, 2] = _turned(turns, i, u)
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract"})
@@ -319,16 +333,16 @@ def _has_moved(i, rest, positions, rotations, still):
 
 
 @nb.njit(inline="always")
-def _write_rest(row, rest_means, rest_axes_f32, means, turns, growths, twists, changed, means_f32, axes_f32):
+def _write_rest(i, row, rest_means, rest_axes_f32, means, turns, growths, twists, changed, means_f32, axes_f32):
     for a in range(3):
-        means[row, a] = means_f32[row, a] = rest_means[row, a]
-        axes_f32[row, 0, a] = rest_axes_f32[row, 0, a]
-        axes_f32[row, 1, a] = rest_axes_f32[row, 1, a]
+        means[i, a] = means_f32[row, a] = rest_means[i, a]
+        axes_f32[row, 0, a] = rest_axes_f32[i, 0, a]
+        axes_f32[row, 1, a] = rest_axes_f32[i, 1, a]
         for b in range(3):
-            turns[row, a, b] = 1.0 if a == b else 0.0
-    growths[row, 0] = growths[row, 1] = 1.0
-    twists[row, 0], twists[row, 1] = 1.0, 0.0
-    changed[row] = False
+            turns[i, a, b] = 1.0 if a == b else 0.0
+    growths[i, 0] = growths[i, 1] = 1.0
+    twists[i, 0], twists[i, 1] = 1.0, 0.0
+    changed[i] = False
 
 
 @nb.njit

@@ -1,6 +1,6 @@
 """Splats whose ellipses keep covering the surface when it is deformed."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
@@ -32,35 +32,46 @@ AdaptationMethod = Literal["surface", "affine", "none"]
 class AdaptedKernels:
     """Every splat of a file after a deformation, in file order.
 
+    What a frame of a drag draws is at hand; the rest is put into file order when it is asked for.
+
     Parameters
     ----------
     binding : KernelBinding
         What was adapted.
-    means : (N, 3) float64
-        Centres in world units.
-    rotations : (N, 3, 3) float64
-        Proper rotation of each splat, rest → deformed: the polar factor of how its ellipse moved. It turns normals and
-        colours; it does not hold the turn of the principal axes within the plane.
-    growths : (N, 2) float64
-        Factor on the effective standard deviation along the axis that was major and the one that was minor at rest.
-    twists : (N, 2) float64
-        Cosine and sine of the turn of the principal axes within the plane, -45° to 45°, before ``rotations``.
-    changed : (N,) bool
-        False where nothing that carries the splat has moved: its row is the file's own, bit for bit.
-    means_f32 : (N, 3) float32
-        ``means`` to draw.
-    axes_f32 : (N, 2, 3) float32
-        In-plane principal axes to draw, world vectors one effective standard deviation long.
+    arrays : KernelArrays
+        Results in carried order, see there.
     """
 
     binding: KernelBinding
-    means: NDArray[np.float64]
-    rotations: NDArray[np.float64]
-    growths: NDArray[np.float64]
-    twists: NDArray[np.float64]
-    changed: NDArray[np.bool_]
-    means_f32: NDArray[np.float32]
-    axes_f32: NDArray[np.float32]
+    arrays: KernelArrays
+
+    @property
+    def means_f32(self) -> NDArray[np.float32]:
+        """(N, 3) centres to draw, in world units."""
+        return self.arrays.means_f32
+
+    @property
+    def axes_f32(self) -> NDArray[np.float32]:
+        """(N, 2, 3) in-plane principal axes to draw: world vectors one effective standard deviation long."""
+        return self.arrays.axes_f32
+
+    @cached_property
+    def means(self) -> NDArray[np.float64]:
+        """(N, 3) centres in world units."""
+        return self._in_file_order(self.arrays.means)
+
+    @cached_property
+    def rotations(self) -> NDArray[np.float64]:
+        """(N, 3, 3) proper rotation of each splat, rest → deformed: the polar factor of how its ellipse moved.
+
+        It turns normals and colours; it does not hold the turn of the principal axes within the plane.
+        """
+        return self._in_file_order(self.arrays.rotations)
+
+    @cached_property
+    def changed(self) -> NDArray[np.bool_]:
+        """(N,) False where nothing that carries the splat has moved: its row is the file's own, bit for bit."""
+        return self._in_file_order(self.arrays.changed)
 
     @property
     def thicknesses(self) -> NDArray[np.float32]:
@@ -71,20 +82,18 @@ class AdaptedKernels:
     def quats(self) -> NDArray[np.float64]:
         """(N, 4) quaternions w, x, y, z of the file's own lengths; unchanged rows hold the file's own numbers."""
         quats = np.array(self.binding.splats.quats, np.float64)
-        rows = np.flatnonzero(self.changed)
-        turns = matrices_to_quats(self.rotations[rows])
-        quats[rows] = quat_products(quat_products(turns, self._twist_quats(rows)), quats[rows])
+        places = np.flatnonzero(self.arrays.changed)
+        rows = self.binding.order[places]
+        # The principal axes turn within the rest plane first, then with the surface. Inert splats have no plane.
+        n_nodes = self.binding.ellipses.n_nodes
+        normals = np.zeros((len(places), 3))
+        normals[places < n_nodes] = self.binding.ellipses.normals[places[places < n_nodes]]
+        cosines, sines = self.arrays.twists[places].T
+        halves = np.sqrt(0.5 * (1.0 + cosines))
+        twists = np.concatenate([halves[:, None], normals * (0.5 * sines / halves)[:, None]], axis=1)
+        turns = quat_products(matrices_to_quats(self.arrays.rotations[places]), twists)
+        quats[rows] = quat_products(turns, quats[rows])
         return quats
-
-    def _twist_quats(self, rows):
-        """(R, 4) turns within the rest plane; the identity for inert splats, which have no plane."""
-        ellipses = self.binding.ellipses
-        nodes = ellipses.node_of_row[rows]
-        normals = np.zeros((len(rows), 3))
-        normals[nodes >= 0] = ellipses.normals[nodes[nodes >= 0]]
-        cosines, sines = self.twists[rows].T
-        half_cosines = np.sqrt(0.5 * (1.0 + cosines))
-        return np.concatenate([half_cosines[:, None], normals * (0.5 * sines / half_cosines)[:, None]], axis=1)
 
     @cached_property
     def log_scales(self) -> NDArray[np.float64]:
@@ -95,20 +104,23 @@ class AdaptedKernels:
         """
         splats, ellipses = self.binding.splats, self.binding.ellipses
         log_scales = np.array(splats.log_scales, np.float64)
-        nodes = np.flatnonzero(self.changed[ellipses.rows])
-        rows = ellipses.rows[nodes]
-        columns = ellipses.axes[nodes, :2].astype(np.int64)
-        growths = self.growths[rows]
-        stored = log_scales[rows[:, None], columns]
+        nodes = np.flatnonzero(self.arrays.changed[: ellipses.n_nodes])
+        entries = ellipses.rows[nodes][:, None], ellipses.axes[nodes, :2].astype(np.int64)
+        growths = self.arrays.growths[nodes]
         if splats.filter_radii is None:
-            log_scales[rows[:, None], columns] = stored + np.log(growths)
+            log_scales[entries] += np.log(growths)
             return log_scales
-        scales2 = np.exp(2.0 * stored)
-        filters2 = np.asarray(splats.filter_radii, np.float64)[rows, None] ** 2
+        scales2 = np.exp(2.0 * log_scales[entries])
+        filters2 = np.asarray(splats.filter_radii, np.float64)[entries[0]] ** 2
         variances = growths**2 * scales2 + (growths**2 - 1.0) * filters2
         with np.errstate(divide="ignore"):
-            log_scales[rows[:, None], columns] = 0.5 * np.log(np.maximum(variances, 1e-12 * (scales2 + filters2)))
+            log_scales[entries] = 0.5 * np.log(np.maximum(variances, 1e-12 * (scales2 + filters2)))
         return log_scales
+
+    def _in_file_order(self, values):
+        result = np.empty_like(values)
+        result[self.binding.order] = values
+        return result
 
 
 def adapt_kernels(
@@ -124,9 +136,9 @@ def adapt_kernels(
     "surface" follows the corners of the triangle inscribed in each occupancy ellipse and takes the Steiner
     circumellipse of the moved triangle [1]_. The paper moves a corner ``t`` by the displacements of its carriers,
     which is not exact under rotation; here each carrier ``j`` moves it as its own neighbourhood moves,
-    ``t' = Σ w_j (p'_j + A_j (t - p_j))``, where ``A_j`` is the least-squares affine map of the six nearest geodesic neighbours,
-    drawn to a similarity with the node's rotation in directions they do not span. Rigid motions and uniform scalings
-    come through exactly.
+    ``t' = Σ w_j (p'_j + A_j (t - p_j))``, where ``A_j`` is the least-squares affine map of the six nearest geodesic
+    neighbours, drawn to a similarity with the node's rotation in directions they do not span. Rigid motions and uniform
+    scalings come through exactly.
 
     "affine" maps the ellipse by the least-squares affine map of its ``hops``-ring, the baseline of the paper. "none"
     moves the centres and nothing else.
@@ -168,25 +180,16 @@ def adapt_kernels(
     rotations = np.ascontiguousarray(deformation.rotations, np.float64)
     if method == "none":
         rotations = np.broadcast_to(np.eye(3), rotations.shape).copy()
-    adapted = _blank(binding, out)
-    arrays = KernelArrays(
-        adapted.means,
-        adapted.rotations,
-        adapted.growths,
-        adapted.twists,
-        adapted.changed,
-        adapted.means_f32,
-        adapted.axes_f32,
-    )
+    arrays = _blank_arrays(binding, out)
     moved = np.empty(len(positions), np.bool_)
     still = STILL_SHARE * binding.ellipses.scene_scale
     if method == "surface":
-        motions = np.empty((len(positions), 12))
+        motions = binding.spare_motions.pop() if binding.spare_motions else np.empty((len(positions), 12))
         find_motions(
             binding.stencils,
             binding.inverse_moments,
             binding.dampings,
-            rest.centers,
+            rest.means,
             positions,
             rotations,
             still,
@@ -194,9 +197,9 @@ def adapt_kernels(
             motions,
         )
     else:
-        find_moved(rest.centers, positions, rotations, still, moved)
+        find_moved(rest.means, positions, rotations, still, moved)
     if method == "none":
-        _move_centers(rest, positions, moved, adapted)
+        _move_centers(rest, positions, moved, arrays)
     else:
         # Blocks that stay in the cache between the two loops.
         carried, images = np.empty(_BLOCK, np.bool_), np.empty((_BLOCK, 9))
@@ -208,7 +211,7 @@ def adapt_kernels(
                     hi,
                     binding.carriers,
                     binding.weights,
-                    rest.centers,
+                    rest.means,
                     rest.semi_axes,
                     motions,
                     moved,
@@ -222,7 +225,7 @@ def adapt_kernels(
                     hops,
                     binding.graph.indptr,
                     binding.graph.indices,
-                    rest.centers,
+                    rest.means,
                     rest.semi_axes,
                     positions,
                     rotations,
@@ -231,17 +234,10 @@ def adapt_kernels(
                     images,
                 )
             write_kernels(lo, hi, carried, images, rest, rotations, arrays)
-    adapt_inert(
-        binding.inert_rows,
-        binding.inert_carriers,
-        binding.inert_weights,
-        rest,
-        positions,
-        rotations,
-        moved,
-        arrays,
-    )
-    return adapted
+        if method == "surface":
+            binding.spare_motions.append(motions)
+    adapt_inert(binding.inert_carriers, binding.inert_weights, rest, positions, rotations, moved, arrays)
+    return AdaptedKernels(binding, arrays)
 
 
 def adapted_splats(splats: Splats, adapted: AdaptedKernels) -> Splats:
@@ -301,15 +297,11 @@ def _validate(binding, deformation, method, hops):
         raise ValueError(f"deformation.rotations must have shape ({n}, 3, 3), got {np.shape(deformation.rotations)}")
 
 
-def _blank(binding: KernelBinding, out: AdaptedKernels | None) -> AdaptedKernels:
-    """Kernels yet to be written, in the arrays of ``out`` if given.
-
-    Always a new object, so that nothing derived from the earlier result is taken for this one's.
-    """
+def _blank_arrays(binding: KernelBinding, out: AdaptedKernels | None) -> KernelArrays:
+    """Arrays yet to be written, those of ``out`` if given."""
     N = binding.splats.n_splats
     if out is None:
-        return AdaptedKernels(
-            binding,
+        return KernelArrays(
             means=np.empty((N, 3)),
             rotations=np.empty((N, 3, 3)),
             growths=np.empty((N, 2)),
@@ -318,18 +310,19 @@ def _blank(binding: KernelBinding, out: AdaptedKernels | None) -> AdaptedKernels
             means_f32=np.empty((N, 3), np.float32),
             axes_f32=np.empty((N, 2, 3), np.float32),
         )
-    if len(out.means) != N:
-        raise ValueError(f"out holds {len(out.means)} splats, the scene has {N}")
-    return replace(out, binding=binding)
+    if len(out.arrays.means) != N:
+        raise ValueError(f"out holds {len(out.arrays.means)} splats, the scene has {N}")
+    return out.arrays
 
 
-def _move_centers(rest, positions, moved, adapted):
-    adapted.means[:] = adapted.means_f32[:] = rest.means
-    adapted.rotations[:] = np.eye(3)
-    adapted.growths[:] = 1.0
-    adapted.twists[:] = (1.0, 0.0)
-    adapted.axes_f32[:] = rest.axes_f32
-    rows = rest.rows[moved]
-    adapted.means[rows] = adapted.means_f32[rows] = positions[moved]
-    adapted.changed[:] = False
-    adapted.changed[rows] = True
+def _move_centers(rest, positions, moved, arrays):
+    arrays.means[:] = rest.means
+    arrays.rotations[:] = np.eye(3)
+    arrays.growths[:] = 1.0
+    arrays.twists[:] = (1.0, 0.0)
+    arrays.changed[:] = False
+    nodes = np.flatnonzero(moved)
+    arrays.means[nodes] = positions[nodes]
+    arrays.changed[nodes] = True
+    arrays.means_f32[rest.order] = arrays.means
+    arrays.axes_f32[rest.order] = rest.axes_f32

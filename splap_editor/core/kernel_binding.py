@@ -27,12 +27,27 @@ _CHUNK = 20_000
 
 
 class RestArrays(NamedTuple):
-    """Splats at rest: centres and drawn axes in file order, then the ellipses node by node."""
+    """Splats at rest, as compiled loops read them.
+
+    Parameters
+    ----------
+    means : (N, 3) float64
+        Centres in carried order: the nodes, then the inert splats.
+    axes_f32 : (N, 2, 3) float32
+        In-plane axes of one standard deviation, in carried order; zero where undefined.
+    order : (N,) int64
+        File row of each place in carried order.
+    semi_axes : (n, 2, 3) float64
+        Semi-axes of the occupancy ellipses.
+    lengths : (n, 2) float64
+        Their lengths.
+    cutoffs : (n,) float64
+        Semi-axis in units of the standard deviation.
+    """
 
     means: NDArray[np.float64]
     axes_f32: NDArray[np.float32]
-    rows: NDArray[np.int64]
-    centers: NDArray[np.float64]
+    order: NDArray[np.int64]
     semi_axes: NDArray[np.float64]
     lengths: NDArray[np.float64]
     cutoffs: NDArray[np.float64]
@@ -106,39 +121,46 @@ class KernelBinding:
             _find_stencils(
                 lo, hi, ellipses.centers, indptr, indices, self.stencils, self.inverse_moments, self.dampings
             )
-        self._bind_inert()
-        rest_axes, self.thicknesses = _rest_axes(splats, ellipses)
+        inert_rows = np.flatnonzero(ellipses.node_of_row < 0)
+        self._bind_inert(np.asarray(splats.means, np.float64)[inert_rows])
+        axes, self.thicknesses = _rest_axes(splats, ellipses, inert_rows)
+        order = np.concatenate([ellipses.rows, inert_rows])
         self.rest = RestArrays(
-            means=np.ascontiguousarray(splats.means, np.float64),
-            axes_f32=rest_axes,
-            rows=np.ascontiguousarray(ellipses.rows, np.int64),
-            centers=np.ascontiguousarray(ellipses.centers, np.float64),
+            means=np.ascontiguousarray(splats.means, np.float64)[order],
+            axes_f32=axes[order],
+            order=order,
             semi_axes=np.ascontiguousarray(ellipses.semi_axes, np.float64),
             lengths=np.linalg.norm(ellipses.semi_axes, axis=2),
             cutoffs=np.ascontiguousarray(ellipses.cutoffs, np.float64),
         )
+        # Arrays of finished adaptations for the next ones: taking and giving back is atomic, so threads never share.
+        self.spare_motions: list[NDArray[np.float64]] = []
         progress(1.0)
 
-    def _bind_inert(self):
-        """Find the active splats that carry the inert ones; without an active one nothing moves."""
-        means = np.asarray(self.splats.means, np.float64)
-        rows = np.flatnonzero(self.ellipses.node_of_row < 0)
+    def _bind_inert(self, means: NDArray[np.float64]):
+        """Find the nodes that carry the inert splats; without any, they stay."""
         k = min(INERT_CARRIERS, self.ellipses.n_nodes)
-        self.inert_rows = rows
-        self.inert_carriers = np.zeros((len(rows), k), np.int32)
-        self.inert_weights = np.zeros((len(rows), k))
+        self.inert_carriers = np.zeros((len(means), k), np.int32)
+        self.inert_weights = np.zeros((len(means), k))
         # A centre that is nowhere is near nothing: its weights stay zero, which leaves it as it is.
-        finite = np.isfinite(means[rows]).all(axis=1)
+        finite = np.isfinite(means).all(axis=1)
         if k and finite.any():
-            distances, carriers = cKDTree(self.ellipses.centers).query(means[rows[finite]], k)
+            distances, carriers = cKDTree(self.ellipses.centers).query(means[finite], k)
             self.inert_carriers[finite] = carriers.reshape(-1, k)
             distances = np.maximum(distances.reshape(-1, k), 1e-12 * self.ellipses.scene_scale)
             # Divided by the nearest first, so that the squares of far floaters' distances stay in range.
             weights = (distances[:, :1] / distances) ** 2
             self.inert_weights[finite] = weights / weights.sum(axis=1, keepdims=True)
 
+    @property
+    def order(self) -> NDArray[np.int64]:
+        """(N,) file row of each place in carried order: the nodes, then the inert splats."""
+        return self.rest.order
 
-def _rest_axes(splats: Splats, ellipses: Ellipses) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+
+def _rest_axes(
+    splats: Splats, ellipses: Ellipses, inert: NDArray[np.int64]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """(N, 2, 3) in-plane axes and (N,) thickness to draw at rest, one standard deviation long; zero where undefined."""
     N = splats.n_splats
     axes = np.zeros((N, 2, 3), np.float32)
@@ -146,7 +168,6 @@ def _rest_axes(splats: Splats, ellipses: Ellipses) -> tuple[NDArray[np.float32],
     axes[ellipses.rows] = ellipses.semi_axes / ellipses.cutoffs[:, None, None]
     if splats.n_scales == 3:
         thicknesses[ellipses.rows] = splats.scales[ellipses.rows, ellipses.axes[:, 2]]
-    inert = np.flatnonzero(ellipses.node_of_row < 0)
     with np.errstate(all="ignore"):
         scales = splats.scales[inert]
         columns = quats_to_matrices(np.asarray(splats.quats)[inert]).swapaxes(1, 2)[:, : splats.n_scales]
