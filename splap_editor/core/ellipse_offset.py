@@ -14,7 +14,7 @@ from splap_editor.core.occupancy import Ellipses
 _NEWTON_STEPS = 60
 
 
-def discs(ellipses: Ellipses) -> NDArray[np.float64]:
+def disc_rows(ellipses: Ellipses) -> NDArray[np.float64]:
     """Ellipses as rows the compiled loops read in one piece.
 
     Parameters
@@ -61,7 +61,7 @@ def normal_offsets(ellipses: Ellipses, pairs: NDArray[np.integer]) -> NDArray[np
     ----------
     .. [1] SpLap, 3DV 2026, supplement B.
     """
-    return _normal_offsets(discs(ellipses), _checked_pairs(pairs, ellipses.n_nodes))
+    return _normal_offsets(disc_rows(ellipses), _checked_pairs(pairs, ellipses.n_nodes))
 
 
 def touch_scales(ellipses: Ellipses, pairs: NDArray[np.integer], epsilon: float) -> NDArray[np.float64]:
@@ -94,7 +94,7 @@ def touch_scales(ellipses: Ellipses, pairs: NDArray[np.integer], epsilon: float)
     """
     if not epsilon >= 0.0:
         raise ValueError(f"epsilon must not be negative, got {epsilon}")
-    return _touch_scales(discs(ellipses), _checked_pairs(pairs, ellipses.n_nodes), float(epsilon))
+    return _touch_scales(disc_rows(ellipses), _checked_pairs(pairs, ellipses.n_nodes), float(epsilon))
 
 
 def _checked_pairs(pairs: NDArray[np.integer], n_nodes: int) -> NDArray[np.int64]:
@@ -107,14 +107,14 @@ def _checked_pairs(pairs: NDArray[np.integer], n_nodes: int) -> NDArray[np.int64
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")
-def _in_frame(disc, other):
-    """``c, A, z0, g`` of the second ellipse in the frame of the first."""
-    dx, dy, dz = other[0] - disc[0], other[1] - disc[1], other[2] - disc[2]
-    px, py, pz = disc[3], disc[4], disc[5]
-    qx, qy, qz = disc[6], disc[7], disc[8]
-    nx, ny, nz = disc[9], disc[10], disc[11]
-    ux, uy, uz = other[3], other[4], other[5]
-    vx, vy, vz = other[6], other[7], other[8]
+def _in_frame(discs, i, j):
+    """``c, A, z0, g`` of ellipse j in the frame of ellipse i."""
+    dx, dy, dz = discs[j, 0] - discs[i, 0], discs[j, 1] - discs[i, 1], discs[j, 2] - discs[i, 2]
+    px, py, pz = discs[i, 3], discs[i, 4], discs[i, 5]
+    qx, qy, qz = discs[i, 6], discs[i, 7], discs[i, 8]
+    nx, ny, nz = discs[i, 9], discs[i, 10], discs[i, 11]
+    ux, uy, uz = discs[j, 3], discs[j, 4], discs[j, 5]
+    vx, vy, vz = discs[j, 6], discs[j, 7], discs[j, 8]
     p = 1.0 / (px * px + py * py + pz * pz)
     q = 1.0 / (qx * qx + qy * qy + qz * qz)
     return (
@@ -175,7 +175,8 @@ def _meeting(c0, c1, a00, a01, a10, a11, limit):
             new = t + slope / bend if bend > 0.0 else 0.5 * (low + high)
             if not low <= new <= high:
                 new = 0.5 * (low + high)
-            done = abs(new - t) <= 1e-9 * min(t, 1.0 - t)
+            # The next step would be of the order of this one's square, and the maximum is flat.
+            done = abs(new - t) <= 1e-5 * min(t, 1.0 - t)
             t = new
             if done:
                 break
@@ -187,12 +188,12 @@ def _meeting(c0, c1, a00, a01, a10, a11, limit):
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")
-def one_way_touch(disc, other, epsilon, limit):
-    """Least f at which the ellipses scaled by f have a normal-wise offset of at most ε in the first one's frame.
+def one_way_touch(discs, i, j, epsilon, limit):
+    """Least f at which ellipses i and j, scaled by f, have a normal-wise offset of at most ε in the frame of i.
 
     Returns inf as soon as f is known to exceed ``limit``.
     """
-    c0, c1, a00, a01, a10, a11, z0, g0, g1 = _in_frame(disc, other)
+    c0, c1, a00, a01, a10, a11, z0, g0, g1 = _in_frame(discs, i, j)
     steep = np.sqrt(g0 * g0 + g1 * g1)
     if abs(z0) - epsilon > limit * steep:
         return np.inf
@@ -227,19 +228,23 @@ def one_way_touch(disc, other, epsilon, limit):
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")
-def touch(disc, other, epsilon, limit):
-    """Touch scale of two ellipses: the larger of both directions; inf as soon as it is known to exceed ``limit``."""
-    f = one_way_touch(disc, other, epsilon, limit)
+def touch(discs, i, j, epsilon, limit):
+    """Touch scale of ellipses i and j: the larger of both directions; inf as soon as it is known to exceed ``limit``.
+
+    The same bits for i, j and for j, i.
+    """
+    first, second = min(i, j), max(i, j)
+    f = one_way_touch(discs, first, second, epsilon, limit)
     if f > limit:
         return np.inf
-    return max(f, one_way_touch(other, disc, epsilon, limit))
+    return max(f, one_way_touch(discs, second, first, epsilon, limit))
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")
-def _touch_scales(rows, pairs, epsilon):
+def _touch_scales(discs, pairs, epsilon):
     out = np.empty(len(pairs))
     for e in range(len(pairs)):
-        out[e] = touch(rows[pairs[e, 0]], rows[pairs[e, 1]], epsilon, np.inf)
+        out[e] = touch(discs, pairs[e, 0], pairs[e, 1], epsilon, np.inf)
     return out
 
 
@@ -265,8 +270,8 @@ def _reaches_height(height, c0, c1, a00, a01, a10, a11, z0, g0, g1):
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")
-def _one_way_offset(disc, other):
-    c0, c1, a00, a01, a10, a11, z0, g0, g1 = _in_frame(disc, other)
+def _one_way_offset(discs, i, j):
+    c0, c1, a00, a01, a10, a11, z0, g0, g1 = _in_frame(discs, i, j)
     squared, y0, y1 = _meeting(c0, c1, a00, a01, a10, a11, 1.0)
     if squared > 1.0:
         return np.inf
@@ -286,9 +291,9 @@ def _one_way_offset(disc, other):
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")
-def _normal_offsets(rows, pairs):
+def _normal_offsets(discs, pairs):
     out = np.empty((len(pairs), 2))
     for e in range(len(pairs)):
-        out[e, 0] = _one_way_offset(rows[pairs[e, 0]], rows[pairs[e, 1]])
-        out[e, 1] = _one_way_offset(rows[pairs[e, 1]], rows[pairs[e, 0]])
+        out[e, 0] = _one_way_offset(discs, pairs[e, 0], pairs[e, 1])
+        out[e, 1] = _one_way_offset(discs, pairs[e, 1], pairs[e, 0])
     return out

@@ -19,7 +19,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.ellipse_offset import discs, one_way_touch, touch
+from splap_editor.core.ellipse_offset import disc_rows, one_way_touch, touch
 from splap_editor.core.occupancy import Ellipses
 
 _LEAF = 8
@@ -38,7 +38,7 @@ class EllipseTree:
     places : (n,) int64
         Place of each node, the inverse.
     discs : (n, 12) float64
-        Rows of `ellipse_offset.discs` in the sorted order.
+        `ellipse_offset.disc_rows` in the sorted order.
     reaches : (n,) float64
         Major semi-axes in the sorted order, world units.
     classes : (C, 4) int64
@@ -55,6 +55,11 @@ class EllipseTree:
     reaches: NDArray[np.float64]
     classes: NDArray[np.int64]
     boxes: NDArray[np.float64]
+
+    @property
+    def arrays(self) -> tuple[NDArray, ...]:
+        """What the compiled searches take, in their order: nodes, discs, reaches, classes, boxes."""
+        return self.nodes, self.discs, self.reaches, self.classes, self.boxes
 
     def label_ranges(self, labels: NDArray[np.integer]) -> NDArray[np.int32]:
         """Least and greatest label in each slot.
@@ -107,7 +112,7 @@ def ellipse_tree(ellipses: Ellipses) -> EllipseTree:
     places = np.empty_like(nodes)
     places[nodes] = np.arange(len(nodes))
     reaches = reaches[nodes]
-    rows = discs(ellipses)[nodes]
+    rows = disc_rows(ellipses)[nodes]
     bounds = np.append(np.flatnonzero(np.diff(sizes[nodes], prepend=-1)), len(nodes))
     classes = np.zeros((len(bounds) - 1, 4), np.int64)
     boxes, slot = [], 0
@@ -140,27 +145,44 @@ def _class_boxes(centers: NDArray[np.float64], reaches: NDArray[np.float64]) -> 
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")
-def _box_distance(box, disc):
-    """Distance from an ellipse's centre to a box; inf for an empty one."""
-    x = max(box[0] - disc[0], disc[0] - box[3], 0.0)
-    y = max(box[1] - disc[1], disc[1] - box[4], 0.0)
-    z = max(box[2] - disc[2], disc[2] - box[5], 0.0)
-    return np.sqrt(x * x + y * y + z * z)
+def _box_distance(boxes, slot, x, y, z):
+    """Distance from a point to a slot's box; inf for an empty one."""
+    dx = max(boxes[slot, 0] - x, x - boxes[slot, 3], 0.0)
+    dy = max(boxes[slot, 1] - y, y - boxes[slot, 4], 0.0)
+    dz = max(boxes[slot, 2] - z, z - boxes[slot, 5], 0.0)
+    return np.sqrt(dx * dx + dy * dy + dz * dz)
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")
-def _may_touch(disc, other, epsilon, limit):
+def _may_touch(discs, reaches, i, j, epsilon, limit):
     """Whether the touch scale, in either direction, may be within the limit: the extents along the centre line."""
-    x, y, z = other[0] - disc[0], other[1] - disc[1], other[2] - disc[2]
+    x, y, z = discs[j, 0] - discs[i, 0], discs[j, 1] - discs[i, 1], discs[j, 2] - discs[i, 2]
     squared = x * x + y * y + z * z
-    a = np.sqrt((x * disc[3] + y * disc[4] + z * disc[5]) ** 2 + (x * disc[6] + y * disc[7] + z * disc[8]) ** 2)
-    b = np.sqrt((x * other[3] + y * other[4] + z * other[5]) ** 2 + (x * other[6] + y * other[7] + z * other[8]) ** 2)
     # The factor allows for rounding: a pair at the limit must be looked at from both of its ends.
-    return squared - epsilon * np.sqrt(squared) <= limit * (a + b) * (1.0 + 1e-12)
+    limit *= 1.0 + 1e-12
+    if squared > (limit * (reaches[i] + reaches[j]) + epsilon) ** 2:
+        return False
+    a = (x * discs[i, 3] + y * discs[i, 4] + z * discs[i, 5]) ** 2
+    b = (x * discs[j, 3] + y * discs[j, 4] + z * discs[j, 5]) ** 2
+    a += (x * discs[i, 6] + y * discs[i, 7] + z * discs[i, 8]) ** 2
+    b += (x * discs[j, 6] + y * discs[j, 7] + z * discs[j, 8]) ** 2
+    return squared <= limit * (np.sqrt(a) + np.sqrt(b)) + epsilon * np.sqrt(squared)
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")
-def nearest_touches(queries, rows, reaches, nodes, classes, boxes, labels, ranges, epsilon, limit, partners, scales):
+def _may_meet(discs, i, j, epsilon, limit):
+    """Whether the heights of ellipse j, grown to the limit, above ellipse i come within the tolerance."""
+    nx, ny, nz = discs[i, 9], discs[i, 10], discs[i, 11]
+    height = (discs[j, 0] - discs[i, 0]) * nx + (discs[j, 1] - discs[i, 1]) * ny + (discs[j, 2] - discs[i, 2]) * nz
+    u = discs[j, 3] * nx + discs[j, 4] * ny + discs[j, 5] * nz
+    v = discs[j, 6] * nx + discs[j, 7] * ny + discs[j, 8] * nz
+    return abs(height) - epsilon <= limit * (1.0 + 1e-12) * np.sqrt(u * u + v * v)
+
+
+@nb.njit(nogil=True, cache=True, error_model="numpy")
+def nearest_touches(
+    queries, nodes, discs, reaches, classes, boxes, labels, ranges, epsilon, limit, ratio, partners, scales
+):
     """Find, for some ellipses, the others with the smallest touch scales.
 
     Depth first, nearer box first; the search radius shrinks with the worst
@@ -170,7 +192,7 @@ def nearest_touches(queries, rows, reaches, nodes, classes, boxes, labels, range
     ----------
     queries : (Q,) int64
         Places in the sorted order.
-    rows, reaches, nodes, classes, boxes
+    nodes, discs, reaches, classes, boxes
         Arrays of `EllipseTree`.
     labels : (n,) int32
         Per place; ellipses with the query's own label are no partners.
@@ -180,6 +202,8 @@ def nearest_touches(queries, rows, reaches, nodes, classes, boxes, labels, range
         World units.
     limit : float
         Largest touch scale to accept.
+    ratio : float
+        Ellipses of more than so many times the query's reach are no partners.
     partners : (Q, m) int32
         Filled with nodes by rising touch scale, then node; -1 where there are fewer.
     scales : (Q, m) float64
@@ -190,12 +214,17 @@ def nearest_touches(queries, rows, reaches, nodes, classes, boxes, labels, range
     gaps = np.empty(128)
     for q in range(len(queries)):
         me = queries[q]
-        disc, reach, label, node = rows[me], reaches[me], labels[me], nodes[me]
+        reach, label = reaches[me], labels[me]
+        x, y, z = discs[me, 0], discs[me, 1], discs[me, 2]
         for k in range(m):
             partners[q, k], scales[q, k] = -1, np.inf
-        for c in range(len(classes)):
-            first, end, base, n_leaves = classes[c]
-            stack[0], gaps[0], height = 1, _box_distance(boxes[base + 1], disc), 1
+        own = 0
+        while classes[own, 1] <= me:
+            own += 1
+        # Its own class first: there are the best partners, which narrow the search among the others.
+        for step in range(len(classes)):
+            first, end, base, n_leaves = classes[(own + step) % len(classes)]
+            stack[0], gaps[0], height = 1, _box_distance(boxes, base + 1, x, y, z), 1
             while height > 0:
                 height -= 1
                 slot = stack[height]
@@ -206,7 +235,8 @@ def nearest_touches(queries, rows, reaches, nodes, classes, boxes, labels, range
                     continue
                 if slot < n_leaves:
                     left, right = 2 * slot, 2 * slot + 1
-                    a, b = _box_distance(boxes[base + left], disc), _box_distance(boxes[base + right], disc)
+                    a = _box_distance(boxes, base + left, x, y, z)
+                    b = _box_distance(boxes, base + right, x, y, z)
                     if a < b:
                         left, right, a, b = right, left, b, a
                     stack[height], gaps[height] = left, a
@@ -216,39 +246,40 @@ def nearest_touches(queries, rows, reaches, nodes, classes, boxes, labels, range
                 start = first + (slot - n_leaves) * _LEAF
                 for other in range(start, min(start + _LEAF, end)):
                     worst = min(limit, scales[q, m - 1])
-                    if labels[other] == label or not _may_touch(disc, rows[other], epsilon, worst):
+                    if labels[other] == label or reaches[other] > ratio * reach:
                         continue
-                    # In one order for both ends of a pair, so that both get the same bits.
-                    if node < nodes[other]:
-                        f = touch(disc, rows[other], epsilon, worst)
-                    else:
-                        f = touch(rows[other], disc, epsilon, worst)
-                    if f > worst or (f == scales[q, m - 1] and nodes[other] > partners[q, m - 1]):
+                    if not _may_touch(discs, reaches, me, other, epsilon, worst):
+                        continue
+                    if not (
+                        _may_meet(discs, me, other, epsilon, worst) and _may_meet(discs, other, me, epsilon, worst)
+                    ):
+                        continue
+                    f = touch(discs, me, other, epsilon, worst)
+                    node = nodes[other]
+                    if f > worst or (f == scales[q, m - 1] and node > partners[q, m - 1]):
                         continue
                     k = m - 1
-                    while k > 0 and (
-                        scales[q, k - 1] > f or (scales[q, k - 1] == f and partners[q, k - 1] > nodes[other])
-                    ):
+                    while k > 0 and (scales[q, k - 1] > f or (scales[q, k - 1] == f and partners[q, k - 1] > node)):
                         scales[q, k], partners[q, k] = scales[q, k - 1], partners[q, k - 1]
                         k -= 1
-                    scales[q, k], partners[q, k] = f, nodes[other]
+                    scales[q, k], partners[q, k] = f, node
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")
-def offset_pairs(start, rows, reaches, nodes, classes, boxes, epsilon, pairs):
+def offset_pairs(start, nodes, discs, reaches, classes, boxes, epsilon, pairs):
     """List the pairs with a normal-wise offset of at most ε in at least one direction.
 
     Parameters
     ----------
     start : int
         Place in the sorted order to begin at.
-    rows, reaches, nodes, classes, boxes
+    nodes, discs, reaches, classes, boxes
         Arrays of `EllipseTree`.
     epsilon : float
         World units.
     pairs : (P, 2) int32
         Filled with nodes. A pair is listed at the end that comes later in the
-        sorted order, hence at its larger one.
+        sorted order, which is the one of the larger size class.
 
     Returns
     -------
@@ -257,8 +288,9 @@ def offset_pairs(start, rows, reaches, nodes, classes, boxes, epsilon, pairs):
     """
     stack = np.empty(128, np.int64)
     count = 0
-    for me in range(start, len(rows)):
-        disc, reach, complete = rows[me], reaches[me], count
+    for me in range(start, len(discs)):
+        reach, complete = reaches[me], count
+        x, y, z = discs[me, 0], discs[me, 1], discs[me, 2]
         for c in range(len(classes)):
             first, end, base, n_leaves = classes[c]
             if first >= me:
@@ -267,8 +299,7 @@ def offset_pairs(start, rows, reaches, nodes, classes, boxes, epsilon, pairs):
             while height > 0:
                 height -= 1
                 slot = stack[height]
-                box = boxes[base + slot]
-                if _box_distance(box, disc) > reach + box[6] + epsilon:
+                if _box_distance(boxes, base + slot, x, y, z) > reach + boxes[base + slot, 6] + epsilon:
                     continue
                 if slot < n_leaves:
                     stack[height], stack[height + 1] = 2 * slot, 2 * slot + 1
@@ -276,15 +307,15 @@ def offset_pairs(start, rows, reaches, nodes, classes, boxes, epsilon, pairs):
                     continue
                 leaf = first + (slot - n_leaves) * _LEAF
                 for other in range(leaf, min(leaf + _LEAF, end, me)):
-                    if not _may_touch(disc, rows[other], epsilon, 1.0):
+                    if not _may_touch(discs, reaches, me, other, epsilon, 1.0):
                         continue
                     if (
-                        one_way_touch(disc, rows[other], epsilon, 1.0) > 1.0
-                        and one_way_touch(rows[other], disc, epsilon, 1.0) > 1.0
+                        one_way_touch(discs, me, other, epsilon, 1.0) > 1.0
+                        and one_way_touch(discs, other, me, epsilon, 1.0) > 1.0
                     ):
                         continue
                     if count == len(pairs):
                         return me, complete
                     pairs[count, 0], pairs[count, 1] = nodes[other], nodes[me]
                     count += 1
-    return len(rows), count
+    return len(discs), count

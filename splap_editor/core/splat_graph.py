@@ -17,6 +17,10 @@ from splap_editor.core.progress import Progress, no_progress, part_of
 N_PARTNERS = 8
 """An edge is among so many smallest touch scales of both its ends."""
 
+PEER_RATIO = 3.0
+"""A splat ranks its contacts with splats of at most so many times its reach; else the few giants that cover
+everything would be everyone's best contacts."""
+
 FRAGMENT_SIZE = 32
 """A component of at most so many nodes may be joined to another by growing its ellipses."""
 
@@ -180,9 +184,7 @@ def _offset_edges(tree: EllipseTree, epsilon: float, progress: Progress) -> NDAr
     buffer = np.empty((1 << 18, 2), np.int32)
     chunks, start, n = [np.empty((0, 2), np.int32)], 0, len(tree.nodes)
     while start < n:
-        end, count = offset_pairs(
-            start, tree.discs, tree.reaches, tree.nodes, tree.classes, tree.boxes, epsilon, buffer
-        )
+        end, count = offset_pairs(start, *tree.arrays, epsilon, buffer)
         if end == start:
             buffer = np.empty((2 * len(buffer), 2), np.int32)
             continue
@@ -198,20 +200,34 @@ def _touch_edges(
     """(E, 2) edges of the touch rule and their touch scales."""
     n = len(tree.nodes)
     everything = np.arange(n)
-    partners, scales = _nearest(tree, everything, everything, epsilon, 1.0, N_PARTNERS, part_of(progress, 0.0, 0.8))
-    nodes = np.repeat(tree.nodes.astype(np.int32), N_PARTNERS)
-    listed = partners.ravel() >= 0
-    pairs = np.stack([nodes[listed], partners.ravel()[listed]], axis=1)
-    scales = scales.ravel()[listed]
-    # A contact that both ends list appears twice.
-    keys = _edge_keys(pairs, n)
-    order = np.argsort(keys, kind="stable")
-    mutual = order[1:][keys[order[1:]] == keys[order[:-1]]]
-    edges, touch = np.sort(pairs[mutual], axis=1), scales[mutual]
+    partners, scales = _nearest(
+        tree, everything, everything, epsilon, 1.0, PEER_RATIO, N_PARTNERS, part_of(progress, 0.0, 0.8)
+    )
+    edges, touch = _mutual(tree, partners, scales)
     labels = connected_components(_adjacency(edges, n), directed=False)[1]
     labels, more, more_touch = _joined(tree, labels, epsilon, 1.0, n, part_of(progress, 0.8, 0.9))
     _, last, last_touch = _joined(tree, labels, epsilon, FRAGMENT_REACH, FRAGMENT_SIZE, part_of(progress, 0.9, 1.0))
     return np.concatenate([edges, more, last]), np.concatenate([touch, more_touch, last_touch])
+
+
+def _mutual(
+    tree: EllipseTree, partners: NDArray[np.int32], scales: NDArray[np.float64]
+) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """(E, 2) contacts that rank high enough at both ends, once each, and their touch scales."""
+    n = len(tree.nodes)
+    listed = partners >= 0
+    owners = np.repeat(np.arange(n), listed.sum(axis=1))
+    others = tree.places[partners[listed]]
+    touch = scales[listed]
+    # An ellipse that is no peer of its partner does not appear in the partner's list, but must rank as high as if.
+    foreign = (tree.reaches[owners] > PEER_RATIO * tree.reaches[others]) & (touch <= scales[others, -1])
+    pairs = np.stack([tree.nodes[owners], tree.nodes[others]], axis=1).astype(np.int32)
+    # A contact that both ends list appears twice.
+    keys = _edge_keys(pairs, n)
+    order = np.argsort(keys, kind="stable")
+    kept = order[1:][keys[order[1:]] == keys[order[:-1]]]
+    kept = np.concatenate([kept, np.flatnonzero(foreign)])
+    return np.sort(pairs[kept], axis=1), touch[kept]
 
 
 def _joined(
@@ -232,7 +248,7 @@ def _joined(
         if not len(queries) or len(sizes) == n_left:
             return labels, np.concatenate(edges), np.concatenate(touch)
         n_left = len(sizes)
-        partners, scales = _nearest(tree, queries, labels[tree.nodes], epsilon, limit, 1, progress)
+        partners, scales = _nearest(tree, queries, labels[tree.nodes], epsilon, limit, np.inf, 1, progress)
         found = partners[:, 0] >= 0
         pairs = np.sort(np.stack([tree.nodes[queries], partners[:, 0]], axis=1)[found], axis=1).astype(np.int32)
         own = labels[tree.nodes[queries]][found]
@@ -251,6 +267,7 @@ def _nearest(
     labels: NDArray[np.integer],
     epsilon: float,
     limit: float,
+    ratio: float,
     m: int,
     progress: Progress,
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
@@ -262,18 +279,7 @@ def _nearest(
     for start in range(0, len(queries), _CHUNK):
         chunk = slice(start, start + _CHUNK)
         nearest_touches(
-            queries[chunk],
-            tree.discs,
-            tree.reaches,
-            tree.nodes,
-            tree.classes,
-            tree.boxes,
-            labels,
-            ranges,
-            epsilon,
-            limit,
-            partners[chunk],
-            scales[chunk],
+            queries[chunk], *tree.arrays, labels, ranges, epsilon, limit, ratio, partners[chunk], scales[chunk]
         )
         progress(min(1.0, (start + _CHUNK) / len(queries)))
     return partners, scales

@@ -22,24 +22,26 @@ def ellipses(request) -> Ellipses:
     return occupancy_ellipses(cloud(100, size=0.4)) if request.param == "alike" else mixed_sizes()
 
 
-def test_the_best_contacts_are_the_brute_force_ones(ellipses):
+@pytest.mark.parametrize("ratio", [np.inf, 2.0])
+def test_the_best_contacts_are_the_brute_force_ones(ellipses, ratio):
     n = ellipses.n_nodes
     pairs = all_pairs(n)
     touch = np.full((n, n), np.inf)
     touch[pairs[:, 0], pairs[:, 1]] = touch[pairs[:, 1], pairs[:, 0]] = touch_scales(ellipses, pairs, EPSILON)
     labels = np.random.default_rng(0).integers(0, 20, n)
     touch[labels[:, None] == labels] = np.inf
+    touch[ellipses.reaches > ratio * ellipses.reaches[:, None]] = np.inf
     tree = ellipse_tree(ellipses)
     partners, scales = np.empty((n, N_PARTNERS), np.int32), np.empty((n, N_PARTNERS))
     nearest_touches(
-        np.arange(n), tree.discs, tree.reaches, tree.nodes, tree.classes, tree.boxes,
-        labels[tree.nodes].astype(np.int32), tree.label_ranges(labels[tree.nodes]), EPSILON, 1.5, partners, scales,
+        np.arange(n), *tree.arrays, labels[tree.nodes].astype(np.int32), tree.label_ranges(labels[tree.nodes]),
+        EPSILON, 1.5, ratio, partners, scales,
     )  # fmt: skip
     for place, node in enumerate(tree.nodes):
         best = [j for j in np.argsort(touch[node], kind="stable")[:N_PARTNERS] if touch[node, j] <= 1.5]
         assert partners[place, : len(best)].tolist() == best
         assert (partners[place, len(best) :] == -1).all()
-        # Which of the two is taken first may differ by rounding.
+        # Which of the two is taken first differs, and with it the rounding.
         np.testing.assert_allclose(scales[place, : len(best)], touch[node, best], rtol=1e-13)
 
 
@@ -48,19 +50,18 @@ def test_pairs_within_the_tolerance_are_the_brute_force_ones(ellipses):
     everything = all_pairs(ellipses.n_nodes)
     within = everything[normal_offsets(ellipses, everything).min(axis=1) <= EPSILON]
     buffer = np.empty((len(within) + 1, 2), np.int32)
-    end, count = offset_pairs(0, tree.discs, tree.reaches, tree.nodes, tree.classes, tree.boxes, EPSILON, buffer)
+    end, count = offset_pairs(0, *tree.arrays, EPSILON, buffer)
     assert (end, count) == (ellipses.n_nodes, len(within))
     assert {frozenset(pair) for pair in buffer[:count].tolist()} == {frozenset(pair) for pair in within.tolist()}
 
 
 def test_a_full_buffer_ends_at_a_whole_ellipse_and_loses_nothing(ellipses):
     tree = ellipse_tree(ellipses)
-    arrays = tree.discs, tree.reaches, tree.nodes, tree.classes, tree.boxes, EPSILON
     everything = np.empty((10_000, 2), np.int32)
-    _, total = offset_pairs(0, *arrays, everything)
+    _, total = offset_pairs(0, *tree.arrays, EPSILON, everything)
     buffer, start, collected = np.empty((total - 1, 2), np.int32), 0, []
     while start < len(tree.nodes):
-        end, count = offset_pairs(start, *arrays, buffer)
+        end, count = offset_pairs(start, *tree.arrays, EPSILON, buffer)
         assert end > start
         collected.append(buffer[:count].copy())
         start = end

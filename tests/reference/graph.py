@@ -78,16 +78,24 @@ def all_pairs(n: int) -> NDArray[np.int64]:
     return np.stack(np.triu_indices(n, 1), axis=1)
 
 
-def touch_rule(touch: NDArray[np.float64], n_partners: int, fragment_size: int, reach: float) -> set[tuple[int, int]]:
+def touch_rule(
+    touch: NDArray[np.float64],
+    reaches: NDArray[np.float64],
+    *,
+    n_partners: int,
+    peer_ratio: float,
+    fragment_size: int,
+    fragment_reach: float,
+) -> set[tuple[int, int]]:
     """Edges of the touch rule from an (n, n) matrix of touch scales, by sorting everything."""
     n = len(touch)
-    best = [
-        {j for j in sorted((j for j in range(n) if j != i), key=lambda j: (touch[i, j], j))[:n_partners]}
-        for i in range(n)
-    ]
-    edges = {(i, j) for i, j in all_pairs(n) if touch[i, j] <= 1.0 and j in best[i] and i in best[j]}
-    pairs = sorted((touch[i, j], i, j) for i, j in all_pairs(n) if touch[i, j] <= reach)
-    for limit, size in ((1.0, n), (reach, fragment_size)):
+    worst = np.full(n, 1.0)
+    for i in range(n):
+        peers = sorted(touch[i, j] for j in range(n) if j != i and reaches[j] <= peer_ratio * reaches[i])
+        worst[i] = min(1.0, peers[n_partners - 1]) if len(peers) >= n_partners else 1.0
+    edges = {(i, j) for i, j in all_pairs(n) if touch[i, j] <= min(worst[i], worst[j])}
+    pairs = sorted((touch[i, j], i, j) for i, j in all_pairs(n) if touch[i, j] <= fragment_reach)
+    for limit, size in ((1.0, n), (fragment_reach, fragment_size)):
         while True:
             parts = _parts(n, edges)
             largest = max(parts, key=lambda part: (len(part), -min(part)))
