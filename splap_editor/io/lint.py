@@ -66,7 +66,7 @@ def lint(splats: Splats) -> list[Finding]:
     Beside `unusable_rows`: rows that are zero throughout, positions that occur
     more than once (every row after the first), and giant splats (longer than
     `GIANT` of the box that holds the middle 98 % of centres along each axis).
-    Takes about a second per million splats.
+    Takes seconds per million splats.
     """
     findings = unusable_rows(splats)
     means = np.ascontiguousarray(splats.means)
