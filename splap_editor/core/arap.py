@@ -27,8 +27,10 @@ _MAX_ITERATIONS = 1000
 _COARSE_TOLERANCE = 1e-3
 """How well the coarse model is settled before the full one starts from it, in units of the scene scale."""
 
-_DRAG_ITERATIONS = 3
-"""Accelerated iterations a frame."""
+_DRAG_ITERATIONS = 8
+_DRAG_TOLERANCE = 5e-4
+"""A drag frame stops after so many iterations, or when one moves no node by more than this (units of s). What is left
+is made up in the frames that follow."""
 
 _REPORT_SECONDS = 0.1
 
@@ -201,13 +203,15 @@ class ArapDeformer:
             self._dragged = ArapMinimiser(problem, Pose.of_rest(problem.rest))
         problem.hold(self._dragged.pose, transforms)
         self._dragged.restart()
+        before = self._dragged.n_iterations
         for _ in range(_DRAG_ITERATIONS):
-            self._dragged.iterate()
+            if not self._dragged.iterate() or self._dragged.last_move <= _DRAG_TOLERANCE * self.scene_scale:
+                break
         if self._coarse is None:
             problem.spread(self._dragged.pose, pose)
         else:
             self._coarse.spread(self._dragged.pose, transforms, self.rest, pose)
-        return self._finished(pose, transforms, np.inf, _DRAG_ITERATIONS)
+        return self._finished(pose, transforms, np.inf, self._dragged.n_iterations - before)
 
     def solve(
         self, transforms: NDArray[np.float64], *, progress: Progress = no_progress, shown: Shown | None = None

@@ -13,9 +13,6 @@ from splap_editor.core.rigid_parts import LooseParts
 from splap_editor.core.rotations import matrices_to_quats
 from splap_editor.core.splat_graph import SplatGraph
 
-N_SAMPLES = 2500
-"""Coarse nodes: a drag frame stays within a few milliseconds, and settling shifts nothing far."""
-
 _N_NEAR = 4
 """Coarse nodes each node's motion is blended from."""
 
@@ -41,9 +38,7 @@ class CoarseModel:
         At most so many samples.
     """
 
-    def __init__(
-        self, rest: NDArray[np.float64], W: sp.csr_matrix, graph: SplatGraph, n_samples: int = N_SAMPLES
-    ) -> None:
+    def __init__(self, rest: NDArray[np.float64], W: sp.csr_matrix, graph: SplatGraph, n_samples: int) -> None:
         self.samples: NDArray[np.int64] = farthest_nodes(graph, n_samples)
         self.rest: NDArray[np.float64] = np.ascontiguousarray(rest[self.samples])
         near, distances = nearest_samples(graph, self.samples, _N_NEAR + 1)

@@ -58,6 +58,11 @@ class ArapMinimiser:
         self.restart()
 
     @property
+    def last_move(self) -> float:
+        """Largest distance that the last iteration moved a node, world units; inf before the first."""
+        return self._moves[-1] if self._moves else np.inf
+
+    @property
     def distance(self) -> float:
         """Estimated largest distance of a node from the minimiser, world units; inf before there is anything to tell.
 

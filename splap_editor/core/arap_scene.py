@@ -11,8 +11,11 @@ from splap_editor.core.arap_coarse import CoarseModel
 from splap_editor.core.arap_problem import edge_weights
 from splap_editor.core.splat_graph import SplatGraph
 
-SMALL = 4000
+SMALL = 6000
 """Scenes of at most so many nodes are dragged in full."""
+
+N_SAMPLES = 4000
+"""Coarse nodes of larger ones: a drag frame costs a few milliseconds, and settling shifts nothing far."""
 
 
 class ArapScene:
@@ -44,4 +47,6 @@ class ArapScene:
     @cached_property
     def coarse(self) -> CoarseModel | None:
         """The coarse model for dragging; None for a scene small enough to do without."""
-        return CoarseModel(self.rest, self.W, self.graph) if len(self.rest) > SMALL else None
+        if len(self.rest) <= SMALL:
+            return None
+        return CoarseModel(self.rest, self.W, self.graph, N_SAMPLES)
