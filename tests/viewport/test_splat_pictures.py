@@ -116,6 +116,7 @@ def test_thinned_splats_cover_about_as_much():
         viewport.splats.look = PLAIN_ELLIPSES
         whole = (np.abs(drawn(viewport) - 0.1).max(axis=-1) > 0.02).mean()
         viewport.begin_motion()
+        viewport.thinning.least_drawn = 1
         for _ in range(3):
             viewport.thinning.note(1.0, 4000)
         viewport.thinning.target_s = 0.3

@@ -50,6 +50,7 @@ def test_rest_draws_all_splats_again():
     with canvas(glyphs, rgba) as viewport:
         viewport.begin_motion()
         viewport.begin_motion()
+        viewport.thinning.least_drawn = 1
         for _ in range(3):
             viewport.thinning.note(1.0, 1000)
         drawn(viewport)
@@ -62,7 +63,7 @@ def test_rest_draws_all_splats_again():
 
 
 def test_thinning_meets_the_target_and_settles():
-    thinning = Thinning(target_s=0.05)
+    thinning = Thinning(target_s=0.05, least_drawn=1)
     assert thinning.choose(100_000) == 1
     for _ in range(6):
         k = thinning.choose(100_000)
@@ -80,8 +81,24 @@ def test_thinning_takes_one_slow_frame_for_a_shader_being_compiled():
 
 def test_thinning_has_a_coarsest_step():
     thinning = Thinning(target_s=1e-9)
-    thinning.note(1.0, 10)
-    assert thinning.choose(10) == STEPS[-1]
+    thinning.note(1.0, 10_000_000)
+    assert thinning.choose(10_000_000) == STEPS[-1]
+
+
+def test_thinning_leaves_enough_to_be_recognised():
+    thinning = Thinning(target_s=1e-9)
+    thinning.note(1.0, 90_000)
+    assert thinning.choose(90_000) == 4
+    assert Thinning(target_s=1e-9).choose(11_000) == 1
+
+
+def test_thinning_that_buys_no_time_is_taken_back():
+    thinning = Thinning(target_s=0.05)
+    for _ in range(12):
+        k = thinning.choose(1_000_000)
+        # The pixels take 200 ms however many splats cover them, a million splats 10 ms more.
+        thinning.note(0.2 + 0.01 / k, 1_000_000 // k)
+    assert thinning.choose(1_000_000) == 1
 
 
 def test_host_is_told_when_the_view_turns_and_not_when_it_rests():
