@@ -5,6 +5,7 @@ import sys
 import traceback
 from collections.abc import Callable
 from pathlib import Path
+from time import sleep
 
 os.environ.setdefault("QT_API", "pyside6")
 
@@ -13,6 +14,7 @@ from PySide6.QtGui import QSurfaceFormat
 from PySide6.QtWidgets import QApplication
 
 from splap_editor.session.cache import StageCache
+from splap_editor.session.jobs import Job
 from splap_editor.session.session import Session
 from splap_editor.tools.handle_tool import HandleTool
 from splap_editor.tools.navigate_tool import NavigateTool
@@ -26,6 +28,9 @@ from splap_editor.ui.theme import apply_theme
 from splap_editor.ui.viewport_widget import ViewportWidget, surface_format
 from splap_editor.viewport.scene_view import SceneView
 from splap_editor.viewport.viewport import Viewport
+from splap_editor.warm_up import is_warm, warm_up_elsewhere
+
+POLL_S = 0.1
 
 
 class Mailbox(QObject):
@@ -62,7 +67,7 @@ def run(path: Path | None = None) -> int:
     window = make_window()
     sys.excepthook = _shows_in(window)
     window.show()
-    QTimer.singleShot(0, lambda: window.session.open(path or sample_path()))
+    QTimer.singleShot(0, lambda: _open_first(window, path or sample_path()))
     return app.exec()
 
 
@@ -90,6 +95,30 @@ def make_window(cache: StageCache | None = None) -> MainWindow:
     window = MainWindow(session, widget, view, context, tools, Display())
     mailbox.setParent(window)
     return window
+
+
+def _open_first(window: MainWindow, path: Path) -> None:
+    """Open the first file; on the very first start when the loops are compiled, which would freeze the window here."""
+    session = window.session
+    if is_warm():
+        session.open(path)
+        return
+
+    def compile_elsewhere(job: Job) -> None:
+        process = warm_up_elsewhere()
+        try:
+            while process.poll() is None:
+                job.report(0.0, "this takes half a minute, once")
+                sleep(POLL_S)
+        finally:
+            if process.poll() is None:
+                process.terminate()
+                process.wait()
+
+    def go_on(*_: object) -> None:
+        session.open(path)
+
+    session.worker.submit(Job("warm", "Getting ready for this computer", compile_elsewhere, go_on, go_on, go_on))
 
 
 def _shows_in(window: MainWindow):

@@ -33,6 +33,7 @@ class ExportDialog(QDialog):
         self.path_field = QLineEdit(str(suggested))
         self.path_field.setMinimumWidth(420)
         browse = QPushButton("Browse…")
+        browse.setAutoDefault(False)
         browse.clicked.connect(self._on_browse_clicked)
         line = QHBoxLayout()
         line.addWidget(self.path_field, 1)

@@ -1,5 +1,6 @@
 """Opening, exporting, saving, and never losing an edit by it."""
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -196,6 +197,7 @@ def _documents() -> str:
 def _folder_of(source: Path) -> Path:
     """Folder to write to: the one used last, else the source's unless it is one of the program's own."""
     used = QSettings().value("files/folder", "", type=str)
-    if used and Path(used).is_dir():
-        return Path(used)
-    return Path(_documents()) if source.parent == sample_path().parent else source.parent
+    own = source.parent == sample_path().parent
+    folders = [Path(used)] if used else []
+    folders += [Path(_documents()), Path.home()] if own else [source.parent]
+    return next((folder for folder in folders if folder.is_dir() and os.access(folder, os.W_OK)), Path.home())

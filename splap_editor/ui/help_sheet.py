@@ -8,7 +8,7 @@ from splap_editor.ui.actions import shown_keys
 from splap_editor.ui.gestures import GESTURES
 from splap_editor.ui.theme import STEP
 
-N_COLUMNS = 3
+COLUMN_PX = 400
 
 
 class HelpSheet(QDialog):
@@ -25,7 +25,7 @@ class HelpSheet(QDialog):
         columns = QHBoxLayout(page)
         columns.setContentsMargins(6 * STEP, 5 * STEP, 6 * STEP, 6 * STEP)
         columns.setSpacing(10 * STEP)
-        for column in _in_columns(blocks):
+        for column in _in_columns(blocks, min(max(parent.width() // COLUMN_PX, 1), 3)):
             stack = QVBoxLayout()
             stack.setSpacing(5 * STEP)
             for title, rows in column:
@@ -50,13 +50,13 @@ def _action_rows(menu: str) -> list[tuple[str, str]]:
     ]
 
 
-def _in_columns(blocks: list) -> list[list]:
+def _in_columns(blocks: list, n_columns: int) -> list[list]:
     """Share blocks out in order, columns about equally tall."""
     total = sum(len(rows) + 2 for _, rows in blocks)
     columns: list[list] = [[]]
     filled = 0
     for block in blocks:
-        if columns[-1] and filled >= total * len(columns) / N_COLUMNS:
+        if columns[-1] and filled >= total * len(columns) / n_columns:
             columns.append([])
         columns[-1].append(block)
         filled += len(block[1]) + 2

@@ -160,6 +160,9 @@ def style_sheet() -> str:
     QComboBox::down-arrow {{ image: url({icon_path("chevron-down")}); width: 12px; height: 12px; }}
     QComboBox QAbstractItemView {{ background: {PANEL}; border: 1px solid {LINE}; outline: 0; padding: 4px; }}
 
+    QDialogButtonBox {{ dialogbuttonbox-buttons-have-icons: 0; }}
+    QMessageBox {{ messagebox-text-interaction-flags: 0; }}
+
     QCheckBox {{ spacing: 8px; }}
     QCheckBox::indicator {{ width: 14px; height: 14px;
         border: 1px solid {FAINT}; border-radius: 3px; background: {FIELD}; }}

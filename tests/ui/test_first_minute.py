@@ -1,0 +1,103 @@
+"""What a new user does in the first minute, with a real mouse and real keys."""
+
+import numpy as np
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtWidgets import QApplication
+
+from splap_editor.io.ply import read_ply
+from splap_editor.ui.export_dialog import ExportDialog
+from splap_editor.ui.main_window import HINT
+from splap_editor.viewport.gizmo_parts import ARROWS
+
+
+def arrow_pixel(driver, axis: int) -> QPoint:
+    """A place on an arrow of the gizmo."""
+    viewport = driver.window.view.viewport
+    gizmo = viewport.gizmo
+    length = 0.7 * gizmo.arm_length(viewport.projection)
+    return driver.pixel_of(gizmo.frame[:3, 3] + length * np.eye(3)[axis])
+
+
+def test_click_drag_undo_and_export_give_a_file_with_what_was_on_screen(driver, qtbot, tmp_path):
+    window, scene = driver.window, driver.scene
+    assert window.overlay.hint == HINT
+
+    driver.click(driver.surface_pixel())
+    assert [handle.name for handle in scene.edit.handles] == ["Handle 1"]
+    assert scene.active_handles == (1,)
+    driver.wait_idle()
+
+    start = arrow_pixel(driver, 2)
+    assert window.view.viewport.gizmo_part(start.x(), start.y()) == ARROWS[2]
+    driver.press(start)
+    for step in range(1, 6):
+        driver.move(start + QPoint(0, -8 * step))
+    qtbot.waitUntil(lambda: scene.kernels is not None, timeout=60_000)
+    assert scene.preview is not None, "the history gets one step, on release"
+    driver.release(start + QPoint(0, -40))
+    driver.wait_idle()
+    assert scene.edit.handles[0].pose.translate[2] > 0
+    assert driver.session.history.undo_label == "Move handle"
+    assert window.isWindowModified()
+    assert window.overlay.hint == ()
+
+    moved = scene.kernels.means.copy()
+    driver.key(Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    driver.wait_idle()
+    assert scene.edit.is_identity
+    driver.key(Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier)
+    driver.wait_idle()
+    np.testing.assert_allclose(scene.kernels.means, moved, atol=1e-9)
+
+    driver.key(Qt.Key.Key_E, Qt.KeyboardModifier.ControlModifier)
+    dialog = next(widget for widget in QApplication.topLevelWidgets() if isinstance(widget, ExportDialog))
+    target = tmp_path / "bent.ply"
+    dialog.path_field.setText(str(target))
+    dialog.accept_button.click()
+    qtbot.waitUntil(target.exists, timeout=60_000)
+    qtbot.waitUntil(lambda: window.toast.text.startswith("Exported"), timeout=60_000)
+    # The file holds float32.
+    np.testing.assert_allclose(read_ply(target).splats.means, scene.kernels.means, atol=1e-6)
+    assert not window.isWindowModified()
+
+
+def test_escape_during_a_drag_leaves_pose_and_history_as_they_were(driver, qtbot):
+    scene = driver.scene
+    driver.click(driver.surface_pixel())
+    driver.wait_idle()
+    start = arrow_pixel(driver, 2)
+    driver.press(start)
+    driver.move(start + QPoint(0, -30))
+    driver.key(Qt.Key.Key_Escape)
+    driver.release(start + QPoint(0, -30))
+    assert scene.preview is None
+    assert scene.edit.is_identity
+    assert driver.session.history.undo_label == "Place handle"
+
+
+def test_grab_by_key_takes_an_axis_and_a_typed_number(driver, qtbot):
+    driver.click(driver.surface_pixel())
+    driver.wait_idle()
+    for key in (Qt.Key.Key_G, Qt.Key.Key_X, Qt.Key.Key_Period, Qt.Key.Key_2, Qt.Key.Key_Return):
+        driver.key(key)
+    driver.wait_idle()
+    np.testing.assert_allclose(driver.scene.edit.handles[0].pose.translate, (0.2, 0.0, 0.0), atol=1e-12)
+    assert driver.window.display.options.mode != "splats" or driver.window.actions_["display.splats"].isChecked()
+
+
+def test_left_drag_on_empty_space_orbits(driver):
+    before = driver.window.view.viewport.camera.view.position
+    driver.drag(QPoint(5, 5), QPoint(40, 20), QPoint(80, 40))
+    after = driver.window.view.viewport.camera.view.position
+    assert np.linalg.norm(after - before) > 0
+    assert not driver.session.history.can_undo
+
+
+def test_right_click_offers_a_menu_and_the_wheel_zooms(driver, qtbot):
+    camera = driver.window.view.viewport.camera
+    with qtbot.waitSignal(driver.window.viewport.menu_wanted):
+        driver.press(QPoint(30, 30), Qt.MouseButton.RightButton)
+    QApplication.activePopupWidget().close()
+    distance = camera.view.distance
+    driver.window.view.viewport.camera.zoom(1.2)
+    assert camera.view.distance < distance

@@ -1,0 +1,167 @@
+"""Cancel, failure, and leaving: nothing is lost and nothing is left running."""
+
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
+from PySide6.QtGui import QDragEnterEvent, QDropEvent
+from PySide6.QtWidgets import QApplication, QMessageBox, QPushButton
+
+from splap_editor.core.handle_nodes import Region
+from splap_editor.resources import resource
+from splap_editor.session.edit import Pose
+
+from .conftest import WAIT_MS, Driver
+
+TUBE = resource("samples", "tube.ply")
+
+
+def bend(driver: Driver) -> None:
+    """Place a handle and move it, as one who has work to lose."""
+    handle = driver.session.add_handle(Region(driver.scene.ellipses.centers[0], 0.1))
+    driver.session.preview_poses({handle.handle_id: Pose((0.0, 0.0, 0.1))})
+    driver.session.commit_preview("Move handle")
+    driver.wait_idle()
+
+
+def question() -> QMessageBox:
+    return next(w for w in QApplication.topLevelWidgets() if isinstance(w, QMessageBox) and w.isVisible())
+
+
+def answer(text: str) -> None:
+    box = question()
+    next(button for button in box.findChildren(QPushButton) if button.text() == text).click()
+
+
+def drop(window, path: Path) -> None:
+    data = QMimeData()
+    data.setUrls([QUrl.fromLocalFile(str(path))])
+    held = (Qt.DropAction.CopyAction, data, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier)
+    window.dragEnterEvent(QDragEnterEvent(QPoint(400, 300), *held))
+    window.dropEvent(QDropEvent(QPointF(400, 300), *held))
+
+
+def test_a_dropped_file_opens(driver, qtbot):
+    before = driver.scene
+    drop(driver.window, resource("samples", "coil.ply"))
+    qtbot.waitUntil(lambda: driver.scene is not before, timeout=WAIT_MS)
+    assert driver.window.windowTitle().startswith("coil.ply")
+    assert driver.session.history.can_undo is False
+
+
+def test_a_broken_file_is_refused_in_a_sentence_and_the_scene_stays(driver, qtbot, tmp_path):
+    broken = tmp_path / "broken.ply"
+    broken.write_bytes(b"ply\nformat binary_little_endian 1.0\nelement vertex 9\n")
+    before = driver.scene
+    driver.window.files.open_path(broken)
+    qtbot.waitUntil(lambda: "broken.ply failed" in driver.window.toast.text, timeout=WAIT_MS)
+    assert driver.scene is before
+    driver.wait_idle()
+
+
+def test_a_file_that_vanished_is_said(driver, qtbot, tmp_path):
+    driver.window.files.open_path(tmp_path / "gone.ply")
+    qtbot.waitUntil(lambda: "gone.ply failed" in driver.window.toast.text, timeout=WAIT_MS)
+
+
+@pytest.mark.parametrize("choice", ["Discard", "Cancel"])
+def test_opening_asks_before_an_edit_is_lost(driver, qtbot, choice):
+    bend(driver)
+    before = driver.scene
+    driver.window.files.open_path(TUBE)
+    answer(choice)
+    if choice == "Discard":
+        qtbot.waitUntil(lambda: driver.scene is not before, timeout=WAIT_MS)
+        driver.wait_idle()
+    else:
+        assert driver.scene is before
+        assert not driver.session.worker.is_busy("open")
+
+
+def test_closing_asks_before_an_edit_is_lost(driver, qtbot):
+    bend(driver)
+    driver.window.close()
+    assert driver.window.isVisible()
+    answer("Cancel")
+    assert driver.window.isVisible()
+    driver.window.close()
+    answer("Discard")
+    assert not driver.window.isVisible()
+
+
+def test_cancel_stops_preparing_and_resume_goes_on(empty_window, qtbot):
+    driver = Driver(empty_window, qtbot)
+    driver.open(TUBE)
+    assert driver.session.state == "preparing"
+    empty_window.actions_["edit.stop"].trigger()
+    assert driver.session.state == "halted"
+    assert empty_window.job_bar.text == "Background work stopped."
+    qtbot.waitUntil(lambda: not driver.session.worker.is_busy(), timeout=WAIT_MS)
+    assert driver.scene.surface is None
+    empty_window.actions_["edit.resume"].trigger()
+    driver.wait_idle()
+    assert driver.scene.surface is not None
+
+
+def test_a_second_file_cancels_the_first(empty_window, qtbot):
+    driver = Driver(empty_window, qtbot)
+    empty_window.files.open_path(TUBE)
+    empty_window.files.open_path(resource("samples", "coil.ply"))
+    qtbot.waitUntil(lambda: driver.scene is not None, timeout=WAIT_MS)
+    assert driver.scene.file.path.name == "coil.ply"
+
+
+def test_saved_edits_open_again(driver, qtbot, tmp_path):
+    bend(driver)
+    edit = driver.scene.edit
+    path = tmp_path / "edit.json"
+    driver.window.files._write_edit(path)
+    driver.window.actions_["handle.reset_all"].trigger()
+    driver.window.files._read_edit(path)
+    assert [handle.pose for handle in driver.scene.edit.handles] == [handle.pose for handle in edit.handles]
+    driver.wait_idle()
+
+
+@pytest.mark.parametrize("moment", ["opening", "preparing", "settling"])
+def test_closing_while_a_job_runs_exits_with_0(tmp_path, moment):
+    program = textwrap.dedent(
+        f"""
+        import sys
+        from pathlib import Path
+        from PySide6.QtCore import QSettings, QTimer
+        from PySide6.QtGui import QSurfaceFormat
+        from PySide6.QtWidgets import QApplication
+        from splap_editor.app import make_window
+        from splap_editor.core.handle_nodes import Region
+        from splap_editor.session.edit import Pose
+        from splap_editor.ui.viewport_widget import surface_format
+        QSettings.setPath(QSettings.Format.NativeFormat, QSettings.Scope.UserScope, {str(tmp_path)!r})
+        QSurfaceFormat.setDefaultFormat(surface_format())
+        app = QApplication(["splap-editor"])
+        window = make_window()
+        window._may_close = True
+        window.show()
+        session = window.session
+        def bend():
+            if session.state == "ready":
+                handle = session.add_handle(Region(session.scene.ellipses.centers[0], 0.2))
+                session.preview_poses({{handle.handle_id: Pose((0.0, 0.0, 0.5))}})
+                session.commit_preview("Move")
+            elif session.state == "settling":
+                window.close()
+        if {moment!r} == "opening":
+            QTimer.singleShot(0, window.close)
+        elif {moment!r} == "preparing":
+            session.scene_changed.connect(window.close)
+        else:
+            session.state_changed.connect(lambda: QTimer.singleShot(0, bend))
+        session.open(Path({str(TUBE)!r}))
+        sys.exit(app.exec())
+        """
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr

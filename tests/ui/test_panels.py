@@ -1,0 +1,132 @@
+"""Panels show the edit, and change it by undoable steps."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+
+from splap_editor.core.handle_nodes import Region
+from splap_editor.io.recipe import SolverSpec
+from splap_editor.session.edit import Pose
+from splap_editor.ui.number_field import NumberField, ScrubLabel
+from splap_editor.ui.options_form import OptionsForm
+from splap_editor.ui.panels.deformer_panel import SOLVER_HINTS
+from splap_editor.ui.panels.pose_form import PoseForm, euler_degrees, quat_of_euler
+
+
+@pytest.mark.parametrize("angles", [(10.0, 20.0, 30.0), (-170.0, 80.0, 5.0), (0.0, 90.0, 0.0), (33.0, -90.0, 0.0)])
+def test_euler_angles_come_back_from_their_quaternion(angles):
+    np.testing.assert_allclose(euler_degrees(quat_of_euler(angles)), angles, atol=1e-6)
+
+
+def test_a_pose_shown_is_not_changed_by_showing_it(qtbot):
+    form = PoseForm()
+    qtbot.addWidget(form)
+    told = []
+    form.changed.connect(told.append)
+    pose = Pose((0.123456789, 0.0, -3.0), quat_of_euler((12.3456, 0.0, 1.0)), 1.23456789)
+    form.show_pose(pose, 1.0)
+    form.scale.setValue(2.0)
+    assert told[0].translate == pose.translate, "digits that are not shown are kept"
+    assert told[0].rotate == pose.rotate
+    assert told[0].scale == 2.0
+
+
+def test_a_label_dragged_sideways_changes_its_number(qtbot):
+    field = NumberField(0.0, 10.0, step=0.5)
+    label = ScrubLabel("Size", field)
+    qtbot.addWidget(label)
+    qtbot.addWidget(field)
+    label.show()
+    values = []
+    label.moved.connect(values.append)
+    QTest.mousePress(label, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, QPoint(2, 5))
+    QTest.mouseMove(label, QPoint(2 + 3 * ScrubLabel.PIXELS_PER_STEP, 5))
+    qtbot.waitUntil(lambda: bool(values))
+    QTest.mouseRelease(label, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, QPoint(20, 5))
+    assert values[-1] == pytest.approx(1.5)
+
+
+def test_an_options_form_gives_a_changed_copy(qtbot):
+    form = OptionsForm(SolverSpec(), SOLVER_HINTS)
+    qtbot.addWidget(form)
+    told = []
+    form.changed.connect(told.append)
+    form.findChild(NumberField, "tolerance").setValue(0.01)
+    assert told == [replace(SolverSpec(), tolerance=0.01)]
+    form.show_value(SolverSpec(kind="libigl"))
+    assert form.findChild(NumberField, "tolerance").isHidden()
+    assert not form.findChild(NumberField, "iterations").isHidden()
+    assert len(told) == 1
+
+
+def test_handle_list_renames_switches_resets_and_deletes(driver):
+    session, panel = driver.session, driver.window.handles_panel
+    session.add_handle(Region(driver.scene.ellipses.centers[0], 0.1), pose=Pose((0.0, 0.0, 0.1)))
+    row = panel._rows[1]
+    row.name.setText("Left end")
+    row.name.editingFinished.emit()
+    assert driver.scene.edit.handles[0].name == "Left end"
+    row.is_enabled.click()
+    assert not driver.scene.edit.handles[0].enabled
+    row.reset.click()
+    assert driver.scene.edit.handles[0].pose == Pose()
+    row.delete.click()
+    assert driver.scene.edit.handles == ()
+    for _ in range(4):
+        session.history.undo()
+    assert driver.scene.edit.handles[0].name == "Handle 1"
+    assert driver.scene.edit.handles[0].pose == Pose((0.0, 0.0, 0.1))
+    driver.wait_idle()
+
+
+def test_numbers_of_the_pose_move_the_handle(driver):
+    driver.session.add_handle(Region(driver.scene.ellipses.centers[0], 0.1))
+    form = driver.window.handles_panel.pose_form
+    form.translate[2].setValue(0.25)
+    assert driver.scene.edit.handles[0].pose.translate == (0.0, 0.0, 0.25)
+    form.rotate[0].setValue(90.0)
+    np.testing.assert_allclose(driver.scene.edit.handles[0].pose.rotate, quat_of_euler((90.0, 0.0, 0.0)), atol=1e-12)
+    driver.wait_idle()
+
+
+def test_method_and_options_are_undoable_steps(driver):
+    panel, session = driver.window.deformer_panel, driver.session
+    panel.method.setCurrentIndex(1)
+    assert driver.scene.edit.method == "bbw"
+    assert panel.solver.isHidden()
+    session.history.undo()
+    assert driver.scene.edit.method == "arap"
+    panel.free_radius.setValue(0.5)
+    assert driver.scene.edit.free_radius == 0.5
+    panel.whole.click()
+    assert driver.scene.edit.free_radius is None
+
+
+def test_the_scene_panel_says_what_is_open(driver):
+    facts = driver.window.scene_panel.facts
+    assert facts["file"].text() == "tube.ply"
+    assert facts["splats"].text().startswith("2,500")
+    assert "in one piece" in facts["surface"].text()
+
+
+def test_display_options_reach_the_picture_and_each_mode_keeps_its_size(driver):
+    display, splats = driver.window.display, driver.window.view.viewport.splats
+    driver.key(Qt.Key.Key_1)
+    assert splats.mode.value == "ellipse"
+    display.set(size_factor=0.3)
+    driver.key(Qt.Key.Key_2)
+    assert splats.mode.value == "splat"
+    assert splats.look.size_factor == 1.0
+    driver.key(Qt.Key.Key_1)
+    assert splats.look.size_factor == 0.3
+
+
+def test_holding_the_key_shows_the_original(driver):
+    splats = driver.window.view.viewport.splats
+    QTest.keyPress(driver.window.viewport, Qt.Key.Key_O)
+    assert splats.compare.value == "original"
+    QTest.keyRelease(driver.window.viewport, Qt.Key.Key_O)
+    assert splats.compare.value == "deformed"
