@@ -1,5 +1,6 @@
 """Graph edges drawn over the splats they join."""
 
+import numba as nb
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from vtkmodules.util.numpy_support import numpy_to_vtk
@@ -13,13 +14,37 @@ from splap_editor.viewport.splat_actor import SplatActor
 
 # Lifted off the surface by this share of the scene, or half of each line would drown in its own ellipses.
 _LIFT = 0.008
+# More lines than this cannot be told apart on a screen, and would take longer to draw than the splats.
+MOST_DRAWN = 100_000
+
+
+@nb.njit(nogil=True, cache=True)
+def _in_view(means, edges, clip, is_in_view):
+    """Mark edges with an end inside the picture; how many there are."""
+    count = 0
+    for e in range(edges.shape[0]):
+        is_in_view[e] = False
+        for k in range(2):
+            i = edges[e, k]
+            x, y, z = means[i, 0], means[i, 1], means[i, 2]
+            w = clip[3, 0] * x + clip[3, 1] * y + clip[3, 2] * z + clip[3, 3]
+            if (
+                abs(clip[0, 0] * x + clip[0, 1] * y + clip[0, 2] * z + clip[0, 3]) <= w
+                and abs(clip[1, 0] * x + clip[1, 1] * y + clip[1, 2] * z + clip[1, 3]) <= w
+            ):
+                is_in_view[e] = True
+                count += 1
+                break
+    return count
 
 
 class EdgeLines:
     """Lines between splat centres, which follow the splats as these move.
 
     The centres are the splat actor's own buffer: a deformation costs the
-    edges nothing. Lines fade towards a colour with depth.
+    edges nothing. Lines fade towards a colour with depth. Where more than
+    `MOST_DRAWN` are in the picture, a fixed random choice of them is drawn:
+    nearer views show ever more, and at last all.
 
     Parameters
     ----------
@@ -49,7 +74,8 @@ class EdgeLines:
             )
         self.actor.ForceOpaqueOn()
         self.actor.VisibilityOff()
-        self.n_edges = 0
+        self.n_edges = self.n_drawn = 0
+        self._drawn_for: tuple[object, ...] = ()
         self.near = 0.0
         self.fade = 0.75
         self.background = (0.1, 0.1, 0.1)
@@ -71,38 +97,60 @@ class EdgeLines:
         width_px : float
             In device pixels.
         """
-        edges = np.asarray(edges, np.int32).reshape(-1, 2)
-        self.n_edges = len(edges)
-        self.actor.SetVisibility(bool(len(edges)))
-        if not len(edges):
-            return
-        self._ids = np.ascontiguousarray(edges.ravel())
-        self._ends = np.arange(0, 2 * len(edges) + 1, 2, dtype=np.int32)
-        rgba = np.full((len(edges), 4), 255, np.uint8)
-        rgba[:, :3] = colors
+        self._edges = np.array(edges, np.int32).reshape(-1, 2)
+        self.n_edges = len(self._edges)
+        self.actor.SetVisibility(self.n_edges > 0)
+        self._rgba = np.full((self.n_edges, 4), 255, np.uint8)
+        self._rgba[:, :3] = colors
+        self._ranks = np.random.default_rng(0).random(self.n_edges)
+        self._drawn_for = ()
+        self.actor.GetProperty().SetLineWidth(width_px)
+        if self.n_edges:
+            self._draw(slice(None))
+
+    def _draw(self, chosen: slice | NDArray[np.bool_]) -> None:
+        self._ids = np.ascontiguousarray(self._edges[chosen].ravel())
+        self._shown_rgba = np.ascontiguousarray(self._rgba[chosen])
+        self.n_drawn = len(self._shown_rgba)
+        self._ends = np.arange(0, len(self._ids) + 1, 2, dtype=np.int32)
         lines = vtkCellArray()
         lines.SetData(numpy_to_vtk(self._ends), numpy_to_vtk(self._ids))
         self._poly.SetLines(lines)
-        self._rgba = rgba
-        self._poly.GetCellData().SetScalars(numpy_to_vtk(rgba))
-        self.actor.GetProperty().SetLineWidth(width_px)
+        self._poly.GetCellData().SetScalars(numpy_to_vtk(self._shown_rgba))
+
+    def _choose(self, projection: Projection, thinning: int) -> None:
+        """Draw what is in the picture, as much of it as there is time for."""
+        most = MOST_DRAWN // thinning
+        if self.n_edges <= most and self.n_drawn == self.n_edges:
+            return
+        clip = projection.clip_from_world.copy()
+        clip[:, 3] += clip[:, :3] @ self._splats.origin
+        wanted = (clip.tobytes(), thinning, self._splats.vtk_points.GetMTime())
+        if wanted == self._drawn_for:
+            return
+        self._drawn_for = wanted
+        chosen = np.empty(self.n_edges, bool)
+        count = _in_view(self._splats.means, self._edges, clip.astype(np.float32), chosen)
+        if count > most:
+            chosen &= self._ranks < most / count
+        self._draw(chosen)
 
     def hide(self) -> None:
         """Draw no edges."""
-        self.actor.VisibilityOff()
-        self.n_edges = 0
+        self.show(np.empty((0, 2), np.int32), np.zeros(3, np.uint8))
 
     def twin(self, splats: SplatActor, renderer: vtkRenderer, width_px: float) -> "EdgeLines":
         """The same edges between the same splats in another window, so many pixels wide."""
         twin = EdgeLines(splats, renderer)
         twin.near, twin.fade, twin.background = self.near, self.fade, self.background
-        twin.show(self._ids.reshape(-1, 2), self._rgba[:, :3], width_px)
+        twin.show(self._edges, self._rgba[:, :3], width_px)
         return twin
 
-    def refresh(self, projection: Projection) -> None:
-        """Set depth fade, near limit and lift for the picture that comes next."""
-        if not self.actor.GetVisibility():
+    def refresh(self, projection: Projection, thinning: int = 1) -> None:
+        """Choose edges and set depth fade, near limit and lift for the picture that comes next."""
+        if not self.n_edges:
             return
+        self._choose(projection, thinning)
         row = np.append(projection.direction, projection.direction @ (self._splats.origin - projection.eye))
         middle = float(row[3])
         half = 0.5 * self._splats.extent

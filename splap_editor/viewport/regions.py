@@ -11,7 +11,7 @@ _HIDDEN = int(SplatFlag.HIDDEN)
 # What blocks the view in a blended picture: the inner part of splats that are not mere haze.
 _SOLID_RADIUS = 1.0
 _SOLID_OPACITY = 0.1
-_CELL_PX = 2
+_CELL_PX = 3
 
 
 @nb.njit(nogil=True, cache=True)
@@ -143,31 +143,52 @@ def in_brush(screen: NDArray[np.float32], path: ArrayLike, radius_px: float) -> 
 
 
 @nb.njit(nogil=True, cache=True)
+def _box_of(screen, inside):
+    x0 = y0 = np.float32(np.inf)
+    x1 = y1 = np.float32(-np.inf)
+    for i in range(screen.shape[0]):
+        if inside[i]:
+            x0, x1 = min(x0, screen[i, 0]), max(x1, screen[i, 0])
+            y0, y1 = min(y0, screen[i, 1]), max(y1, screen[i, 1])
+    return x0, y0, x1, y1
+
+
+@nb.njit(nogil=True, cache=True)
 def _depth_grid(screen, axes_u, axes_v, shape, colors, clip, size, scale, solid_radius, solid_cut, left, top, grid):
     """Nearest depth of each cell over the ellipses that cover its centre, each ellipse projected affinely."""
     rows, columns = grid.shape
+    half_x, half_y = np.float32(0.5) * size[0], np.float32(-0.5) * size[1]
+    right, bottom = left + columns * _CELL_PX, top + rows * _CELL_PX
     is_perspective = clip[3, 0] != 0.0 or clip[3, 1] != 0.0 or clip[3, 2] != 0.0
-    half = np.array([0.5 * size[0], -0.5 * size[1]], np.float32)
-    local = np.empty((2, 3), np.float32)
+    # Largest pixels per world unit at unit depth, to pass over what is far from the region.
+    zoom = max(half_x * np.sqrt((clip[0, :3] ** 2).sum()), -half_y * np.sqrt((clip[1, :3] ** 2).sum())) * np.float32(
+        2.0
+    )
     for i in range(screen.shape[0]):
         reach = min(shape[i, 1] * scale, solid_radius)
-        depth = screen[i, 2]
+        depth, px, py = screen[i, 2], screen[i, 0], screen[i, 1]
         if not depth > 0.0 or reach <= 0.0 or colors[i, 3] < solid_cut:
             continue
         # In perspective w is the depth itself; an orthographic camera has w = 1 everywhere.
         w = depth if is_perspective else np.float32(1.0)
-        px, py = screen[i, 0], screen[i, 1]
-        nx, ny = px / half[0] - 1.0, py / half[1] + 1.0
-        for k in range(2):
-            axis = axes_u[i] if k == 0 else axes_v[i]
-            dw = clip[3, 0] * axis[0] + clip[3, 1] * axis[1] + clip[3, 2] * axis[2]
-            local[k, 0] = half[0] / w * (clip[0, 0] * axis[0] + clip[0, 1] * axis[1] + clip[0, 2] * axis[2] - nx * dw)
-            local[k, 1] = half[1] / w * (clip[1, 0] * axis[0] + clip[1, 1] * axis[1] + clip[1, 2] * axis[2] - ny * dw)
-            local[k, 2] = clip[2, 0] * axis[0] + clip[2, 1] * axis[1] + clip[2, 2] * axis[2]
-        ax, ay, bx, by = local[0, 0], local[0, 1], local[1, 0], local[1, 1]
+        ux, uy, uz = axes_u[i, 0], axes_u[i, 1], axes_u[i, 2]
+        vx, vy, vz = axes_v[i, 0], axes_v[i, 1], axes_v[i, 2]
+        far = zoom / w * reach * np.sqrt(ux * ux + uy * uy + uz * uz + vx * vx + vy * vy + vz * vz)
+        if px + far < left or px - far > right or py + far < top or py - far > bottom:
+            continue
+        nx, ny = px / half_x - 1.0, py / half_y + 1.0
+        uw = clip[3, 0] * ux + clip[3, 1] * uy + clip[3, 2] * uz
+        vw = clip[3, 0] * vx + clip[3, 1] * vy + clip[3, 2] * vz
+        ax = half_x / w * (clip[0, 0] * ux + clip[0, 1] * uy + clip[0, 2] * uz - nx * uw)
+        ay = half_y / w * (clip[1, 0] * ux + clip[1, 1] * uy + clip[1, 2] * uz - ny * uw)
+        bx = half_x / w * (clip[0, 0] * vx + clip[0, 1] * vy + clip[0, 2] * vz - nx * vw)
+        by = half_y / w * (clip[1, 0] * vx + clip[1, 1] * vy + clip[1, 2] * vz - ny * vw)
+        az = clip[2, 0] * ux + clip[2, 1] * uy + clip[2, 2] * uz
+        bz = clip[2, 0] * vx + clip[2, 1] * vy + clip[2, 2] * vz
         det = ax * by - ay * bx
         if abs(det) < 1e-9:
             continue
+        inverse = np.float32(1.0) / det
         hx, hy = reach * np.sqrt(ax * ax + bx * bx), reach * np.sqrt(ay * ay + by * by)
         c0, c1 = max(int((px - hx - left) / _CELL_PX), 0), min(int((px + hx - left) / _CELL_PX) + 1, columns)
         r0, r1 = max(int((py - hy - top) / _CELL_PX), 0), min(int((py + hy - top) / _CELL_PX) + 1, rows)
@@ -175,9 +196,9 @@ def _depth_grid(screen, axes_u, axes_v, shape, colors, clip, size, scale, solid_
             y = (r + 0.5) * _CELL_PX + top - py
             for c in range(c0, c1):
                 x = (c + 0.5) * _CELL_PX + left - px
-                a, b = (by * x - bx * y) / det, (ax * y - ay * x) / det
+                a, b = (by * x - bx * y) * inverse, (ax * y - ay * x) * inverse
                 if a * a + b * b <= reach * reach:
-                    z = depth + a * local[0, 2] + b * local[1, 2]
+                    z = depth + a * az + b * bz
                     if 0.0 < z < grid[r, c]:
                         grid[r, c] = z
 
@@ -226,8 +247,9 @@ def visible_only(
     visible = inside.copy()
     if not inside.any():
         return visible
-    low = np.clip(np.floor(screen[inside, :2].min(axis=0)), 0, None)
-    high = np.minimum(np.ceil(screen[inside, :2].max(axis=0)) + 1, [projection.width, projection.height])
+    x0, y0, x1, y1 = _box_of(screen, inside)
+    low = np.maximum(np.floor([x0, y0]), 0.0)
+    high = np.minimum(np.ceil([x1, y1]) + 1.0, [projection.width, projection.height])
     columns, rows = np.maximum((high - low) / _CELL_PX + 1, 1).astype(int)
     grid = np.full((rows, columns), np.inf, np.float32)
     is_ellipses = actor.look.mode is DisplayMode.ELLIPSES

@@ -26,6 +26,15 @@ def _box(means):
     return low, high
 
 
+@nb.njit(nogil=True, cache=True)
+def _mix(colors, tints, mixed):
+    for i in range(colors.shape[0]):
+        share = np.int32(tints[i, 3])
+        for k in range(3):
+            mixed[i, k] = (np.int32(colors[i, k]) * (255 - share) + np.int32(tints[i, k]) * share + 127) // 255
+        mixed[i, 3] = colors[i, 3]
+
+
 Tint = tuple[float, float, float, float]
 
 
@@ -279,11 +288,10 @@ class SplatActor:
         self._poly.Modified()
 
     def _mix_tints(self) -> None:
-        self.colors[:] = self._untinted
-        if self._tints is not None:
-            share = self._tints[:, 3:].astype(np.uint16)
-            mixed = self._untinted[:, :3] * (255 - share) + self._tints[:, :3] * share
-            self.colors[:, :3] = (mixed + 127) // 255
+        if self._tints is None:
+            self.colors[:] = self._untinted
+        else:
+            _mix(self._untinted, self._tints, self.colors)
         self._modified("colors")
 
     def _index(self) -> None:

@@ -231,7 +231,7 @@ class SplatScene:
                 actor.set_thinning(thinning)
         self._follow_turn(projection)
         self.edges.background = background
-        self.edges.refresh(projection)
+        self.edges.refresh(projection, thinning)
 
     def _follow_turn(self, projection: Projection) -> None:
         """Sort again, and tell the host, when the view has turned far enough to show."""

@@ -248,3 +248,23 @@ def test_closing_gives_the_host_its_window_back():
         other.close()
         assert window.GetRenderers().GetNumberOfItems() == renderers
         assert not renderer.HasObserver("StartEvent")
+
+
+def test_too_many_edges_are_thinned_and_a_near_view_shows_all_of_its_own(monkeypatch):
+    monkeypatch.setattr("splap_editor.viewport.edge_lines.MOST_DRAWN", 500)
+    glyphs, rgba = random_splats(2000, size=0.01)
+    edges = np.array([[i, i + 1] for i in range(1999)])
+    with canvas(glyphs, rgba) as viewport:
+        lines = viewport.splats.edges
+        lines.show(edges, np.array([255, 0, 0], np.uint8))
+        drawn(viewport)
+        # A fixed random choice: within three standard deviations of the wanted number.
+        assert lines.n_edges == 1999 and abs(lines.n_drawn - 500) < 60
+        viewport.camera.zoom(6.0)
+        drawn(viewport)
+        pixels = viewport.projection.pixels(glyphs.means)
+        is_in = ((pixels >= 0) & (pixels <= viewport.renderer.GetSize())).all(axis=1)
+        assert lines.n_drawn == is_in[edges].any(axis=1).sum() < 500
+        lines.show(edges[:10], np.array([255, 0, 0], np.uint8))
+        drawn(viewport)
+        assert lines.n_drawn == 10
