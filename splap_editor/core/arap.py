@@ -19,6 +19,7 @@ from splap_editor.core.handle_motion import turns_left_open
 from splap_editor.core.libigl_arap import libigl_arap, triangle_components
 from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.rigid_parts import LooseParts, RigidComponents
+from splap_editor.core.settled_offset import SettledOffset
 from splap_editor.core.splat_graph import SplatGraph
 
 _MAX_ITERATIONS = 1000
@@ -142,6 +143,7 @@ class ArapDeformer:
         self._loose = LooseParts(self.rest, self._constraints)
         self._triangles = triangles
         self._dragged: ArapMinimiser | None = None
+        self._offset: SettledOffset | None = None
         progress(1.0)
 
     def _bound(self, triangles: NDArray[np.integer] | None) -> Constraints:
@@ -198,19 +200,18 @@ class ArapDeformer:
         if self._rigid.follow(transforms, pose):
             self._loose.follow(pose)
             return Deformation(pose.positions, pose.rotations)
-        problem = self._problem if self._coarse is None else self._coarse.problem
         if self._dragged is None:
-            self._dragged = ArapMinimiser(problem, Pose.of_rest(problem.rest))
-        problem.hold(self._dragged.pose, transforms)
-        self._dragged.restart()
+            self._dragged = self._approached(transforms, no_progress)
+        else:
+            self._dragged.problem.hold(self._dragged.pose, transforms)
+            self._dragged.restart()
         before = self._dragged.n_iterations
         for _ in range(_DRAG_ITERATIONS):
             if not self._dragged.iterate() or self._dragged.last_move <= _DRAG_TOLERANCE * self.scene_scale:
                 break
-        if self._coarse is None:
-            problem.spread(self._dragged.pose, pose)
-        else:
-            self._coarse.spread(self._dragged.pose, transforms, self.rest, pose)
+        self._spread(self._dragged, transforms, pose)
+        if self._offset is not None:
+            self._offset.add(transforms, pose)
         return self._finished(pose, transforms, np.inf, self._dragged.n_iterations - before)
 
     def solve(
@@ -247,29 +248,45 @@ class ArapDeformer:
         if self._rigid.follow(transforms, pose):
             self._loose.follow(pose)
             return Deformation(pose.positions, pose.rotations)
-        minimiser = self._started(transforms, part_of(progress, 0.0, 0.3))
+        dragged = self._approached(transforms, part_of(progress, 0.0, 0.3))
+        start = self._held_pose(transforms)
+        self._spread(dragged, transforms, start)
+        problem = self._problem
+        minimiser = ArapMinimiser(problem, Pose(start.positions[problem.nodes], start.rotations[problem.nodes]))
 
         def settled(residual: float) -> Deformation:
             whole = self._held_pose(transforms)
-            self._problem.spread(minimiser.pose, whole)
+            problem.spread(minimiser.pose, whole)
             return self._finished(whole, transforms, residual, minimiser.n_iterations)
 
         tolerance = self.options.tolerance * self.scene_scale
         report = _Report(part_of(progress, 0.3, 1.0), minimiser, tolerance, shown and (lambda: shown(settled(np.inf))))
         residual = minimiser.settle(tolerance, _MAX_ITERATIONS, report)
-        return settled(residual / self.scene_scale)
-
-    def _started(self, transforms: NDArray[np.float64], progress: Progress) -> ArapMinimiser:
-        """A minimiser of the full problem, close to its minimum: from the coarse one where there is one."""
-        report = _Report(progress)
+        result = settled(residual / self.scene_scale)
+        # The next drag goes on from here.
         if self._coarse is None:
-            return approached(self._problem, self.handles, transforms, self.scene_scale, report)
-        coarse = approached(self._coarse.problem, self.handles, transforms, self.scene_scale, report)
-        coarse.settle(_COARSE_TOLERANCE * self.scene_scale, _MAX_ITERATIONS, report)
-        whole = self._held_pose(transforms)
-        self._coarse.spread(coarse.pose, transforms, self.rest, whole)
-        nodes = self._problem.nodes
-        return ArapMinimiser(self._problem, Pose(whole.positions[nodes], whole.rotations[nodes]))
+            self._dragged = minimiser
+        else:
+            self._dragged = dragged
+            end = Pose(result.positions, result.rotations)
+            self._offset = SettledOffset(self.rest, np.flatnonzero(self._constraints.free), start, end, transforms)
+        return result
+
+    def _approached(self, transforms: NDArray[np.float64], progress: Progress) -> ArapMinimiser:
+        """The drag's minimiser, brought from rest to ``transforms``; the coarse one where there is one."""
+        report = _Report(progress)
+        problem = self._problem if self._coarse is None else self._coarse.problem
+        minimiser = approached(problem, self.handles, transforms, self.scene_scale, report)
+        if self._coarse is not None:
+            minimiser.settle(_COARSE_TOLERANCE * self.scene_scale, _MAX_ITERATIONS, report)
+        return minimiser
+
+    def _spread(self, dragged: ArapMinimiser, transforms: NDArray[np.float64], whole: Pose) -> None:
+        """Bring a drag's minimiser's pose to all free nodes."""
+        if self._coarse is None:
+            self._problem.spread(dragged.pose, whole)
+        else:
+            self._coarse.spread(dragged.pose, transforms, self.rest, whole)
 
     def _by_alternation(self, transforms: NDArray[np.float64], pose: Pose, progress: Progress) -> Deformation:
         """Plain local/global iterations from rest with the held nodes moved."""

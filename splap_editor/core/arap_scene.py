@@ -32,14 +32,32 @@ class ArapScene:
         Laplacian, see `ArapDeformer`.
     graph : SplatGraph
         The splat graph of the same nodes.
+    small : int
+        A scene of at most so many nodes does without a coarse model.
+    n_samples : int
+        Nodes of the coarse model.
+
+    Raises
+    ------
+    ValueError
+        If the shapes do not fit.
     """
 
-    def __init__(self, rest: NDArray[np.float64], L: sp.csr_matrix, graph: SplatGraph) -> None:
+    def __init__(
+        self,
+        rest: NDArray[np.float64],
+        L: sp.csr_matrix,
+        graph: SplatGraph,
+        *,
+        small: int = SMALL,
+        n_samples: int = N_SAMPLES,
+    ) -> None:
         rest = np.ascontiguousarray(rest, np.float64)
         if rest.ndim != 2 or rest.shape[1] != 3 or L.shape != (len(rest), len(rest)):
             raise ValueError(f"rest and L must have shapes (n, 3) and (n, n), got {rest.shape} and {L.shape}")
         self.rest: NDArray[np.float64] = rest
         self.graph = graph
+        self._small, self._n_samples = small, n_samples
         self.W: sp.csr_matrix = edge_weights(L)
         _, component = connected_components(self.W, directed=False)
         self.component: NDArray[np.int32] = component.astype(np.int32)
@@ -47,6 +65,6 @@ class ArapScene:
     @cached_property
     def coarse(self) -> CoarseModel | None:
         """The coarse model for dragging; None for a scene small enough to do without."""
-        if len(self.rest) <= SMALL:
+        if len(self.rest) <= self._small:
             return None
-        return CoarseModel(self.rest, self.W, self.graph, N_SAMPLES)
+        return CoarseModel(self.rest, self.W, self.graph, self._n_samples)

@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 
-from splap_editor.core import arap_scene
 from splap_editor.core.arap import ArapOptions
 from splap_editor.core.arap_scene import ArapScene
 from splap_editor.core.deformer import UnconstrainedComponentError
@@ -18,6 +17,11 @@ KINDS = ("converged", "local-global", "libigl")
 
 def _distance(a, b):
     return np.linalg.norm(a.positions - b.positions, axis=1).max()
+
+
+def _coarse(scene, n_samples):
+    """What deformers of a scene share, with a coarse model however small it is."""
+    return ArapScene(scene.rest, scene.L, scene.graph, small=0, n_samples=n_samples)
 
 
 def _dense_weights(scene):
@@ -274,12 +278,11 @@ def test_dragging_ends_where_solving_settles():
     assert _distance(frame, deformer.solve(BEND)) < 5e-3
 
 
-def test_coarse_drag_is_close_to_the_settled_result(monkeypatch):
-    monkeypatch.setattr(arap_scene, "SMALL", 1000)
-    monkeypatch.setattr(arap_scene, "N_SAMPLES", 500)
+def test_coarse_drag_is_close_to_the_settled_result():
     scene = strip(120, 30)
+    shared = _coarse(scene, 500)
     handles = holding(scene.rest, [scene.rest[:, 0] > 0.93], scene.rest[:, 0] < 0.07)
-    deformer = scene.deformer(handles)
+    deformer = scene.deformer(handles, scene=shared)
     for share in np.linspace(0.1, 1.0, 10):
         frame = deformer.drag(
             rigid(50.0 * share, [0.0, 1.0, 0.0], [1.0, 0.12, 0.0], share * np.array([-0.1, 0.05, 0.1]))[None]
@@ -294,11 +297,23 @@ def test_coarse_drag_is_close_to_the_settled_result(monkeypatch):
     )
 
 
-def test_coarse_drag_moves_with_a_handle_between_the_samples(monkeypatch):
-    monkeypatch.setattr(arap_scene, "SMALL", 1000)
-    monkeypatch.setattr(arap_scene, "N_SAMPLES", 300)
+def test_a_drag_goes_on_from_the_settled_pose_without_a_jump():
     scene = strip(120, 30)
-    shared = ArapScene(scene.rest, scene.L, scene.graph)
+    shared = _coarse(scene, 300)
+    deformer = scene.deformer(holding(scene.rest, [scene.rest[:, 0] > 0.93], scene.rest[:, 0] < 0.07), scene=shared)
+    first = deformer.drag(BEND)
+    settled = deformer.solve(BEND)
+    again = deformer.drag(BEND)
+    assert _distance(first, settled) > 4e-3
+    # One more step of the coarse model is all that lies between.
+    assert _distance(again, settled) < 5e-4
+    np.testing.assert_allclose(again.rotations, settled.rotations, atol=5e-3)
+    assert _distance(deformer.drag(np.eye(4)[None]), deformer.solve(np.eye(4)[None])) == 0.0
+
+
+def test_coarse_drag_moves_with_a_handle_between_the_samples():
+    scene = strip(120, 30)
+    shared = _coarse(scene, 300)
     node = np.setdiff1d(np.arange(3000, 3600), shared.coarse.samples)[10]
     handles = holding(scene.rest, [np.arange(3600) == node], scene.rest[:, 0] < 0.07)
     T = rigid(0.0, [0.0, 1.0, 0.0], scene.rest[node], [0.0, 0.0, 0.2])

@@ -21,7 +21,7 @@ def test_half_way_twice_is_the_whole_turn(degrees):
 def test_ease_turns_at_constant_speed_and_carries_the_center_straight():
     T = rigid(90.0, [0.0, 0.0, 1.0], CENTER, [4.0, 0.0, 0.0], scale=3.0)[None]
     quarter = eased_transforms(HANDLES, T, 0.25)[0]
-    np.testing.assert_allclose(moved(quarter, CENTER), CENTER + [1.0, 0.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(moved(quarter, CENTER), np.add(CENTER, [1.0, 0.0, 0.0]), atol=1e-12)
     expected = 1.5 * Rotation.from_rotvec([0.0, 0.0, np.pi / 8]).as_matrix()
     np.testing.assert_allclose(quarter[:3, :3], expected, atol=1e-12)
 
