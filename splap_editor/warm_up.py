@@ -44,6 +44,8 @@ def warm_up(progress: Progress = no_progress) -> None:
         deformer = deformer_of(surface, edit, handles_of(surface, edit), progress=no_progress)
         deformer.drag(edit.transforms)
         kernels = kernels_of(surface, edit, deformer.solve(edit.transforms))
+        # A drag that goes on from a settled pose takes another path.
+        deformer.drag(edit.transforms)
         progress(0.7 + 0.1 * number)
     adapted_splats(splats, kernels)
     view_colors(splats.sh0, splats.shN, kernels.means, kernels.rotations, np.zeros(3))
@@ -63,7 +65,7 @@ def _stamp() -> Path:
     return default_cache_folder() / f"compiled-{versions}"
 
 
-def _sheet(n: int = 64) -> Splats:
+def _sheet(n: int = 80) -> Splats:
     """A wavy sheet of n² overlapping splats, large enough for the coarse model of a drag."""
     x, y = (axis.ravel() for axis in np.meshgrid(np.linspace(-1, 1, n), np.linspace(-1, 1, n)))
     rng = np.random.default_rng(0)
