@@ -16,6 +16,7 @@ from PySide6.QtWidgets import QApplication
 from splap_editor.session.cache import StageCache
 from splap_editor.session.jobs import Job
 from splap_editor.session.session import Session
+from splap_editor.tools.axes_tool import AxesTool
 from splap_editor.tools.handle_tool import HandleTool
 from splap_editor.tools.navigate_tool import NavigateTool
 from splap_editor.tools.select_tool import SelectTool
@@ -28,7 +29,7 @@ from splap_editor.ui.theme import apply_theme
 from splap_editor.ui.viewport_widget import ViewportWidget, surface_format
 from splap_editor.viewport.scene_view import SceneView
 from splap_editor.viewport.viewport import Viewport
-from splap_editor.warm_up import is_warm, warm_up_elsewhere
+from splap_editor.warm_up import is_warm, load_view_loops, warm_up_elsewhere
 
 POLL_S = 0.1
 
@@ -81,6 +82,7 @@ def make_window(cache: StageCache | None = None) -> MainWindow:
     view = SceneView(session, viewport)
     context = ToolContext(session, viewport)
     context.navigate = NavigateTool(context)
+    axes = AxesTool(context)
     tools = ToolManager(
         context,
         {
@@ -88,11 +90,12 @@ def make_window(cache: StageCache | None = None) -> MainWindow:
             "pin": HandleTool(context, "pin"),
             "select": SelectTool(context),
         },
-        (TransformTool(context),),
+        (axes, TransformTool(context)),
         context.navigate,
     )
     widget.connect_tools(tools.pointer, tools.key)
     window = MainWindow(session, widget, view, context, tools, Display())
+    axes.fly_to = window.view_commands.fly_to
     mailbox.setParent(window)
     return window
 
@@ -102,6 +105,7 @@ def _open_first(window: MainWindow, path: Path) -> None:
     session = window.session
     if is_warm():
         session.open(path)
+        session.view_worker.submit(Job("load", "", lambda job: load_view_loops()))
         return
 
     def compile_elsewhere(job: Job) -> None:

@@ -55,6 +55,14 @@ def warm_up(progress: Progress = no_progress) -> None:
     progress(1.0)
 
 
+def load_view_loops() -> None:
+    """Load what picks, sorts and colours from the cache, off the window's thread, so that its first use is quick."""
+    splats = _sheet(4)
+    _view(splats, splats.means)
+    n = len(splats.means)
+    view_colors(splats.sh0, splats.shN, np.zeros((n, 3)), np.broadcast_to(np.eye(3), (n, 3, 3)), np.zeros(3))
+
+
 def warm_up_elsewhere() -> subprocess.Popen:
     """Start `warm_up` in a process of its own; its exit code is 0 when all is compiled."""
     return subprocess.Popen([sys.executable, "-m", "splap_editor.warm_up"], stdin=subprocess.DEVNULL)

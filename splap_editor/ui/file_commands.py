@@ -1,6 +1,7 @@
 """Opening, exporting, saving, and never losing an edit by it."""
 
 import os
+import traceback
 from collections.abc import Callable
 from pathlib import Path
 
@@ -153,7 +154,19 @@ class FileCommands:
 
     def _on_failed(self, title: str, error: Exception) -> None:
         self._after_export = None
-        self._toast.fail(f"{title} failed: {sentence(error)}")
+        buttons = {}
+        if self._session.state == "failed":
+            buttons["Try_again"] = self._session.resume
+        if not isinstance(error, (ValueError, OSError, MemoryError)):
+            buttons["Details"] = lambda: self._show_details(title, error)
+        self._toast.fail(f"{title} failed: {sentence(error)}", **buttons)
+
+    def _show_details(self, title: str, error: Exception) -> None:
+        box = QMessageBox(QMessageBox.Icon.NoIcon, title, f"{title} failed.", parent=self._window)
+        box.setInformativeText("This is a fault of the program. The text below helps to mend it.")
+        box.setDetailedText("".join(traceback.format_exception(error)))
+        box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        box.open()
 
     # ---------------------------------------------------------------- dialogs
 

@@ -114,6 +114,8 @@ class MainWindow(QMainWindow):
         session.state_changed.connect(self._refresh)
         session.exported.connect(lambda report: self._refresh())
         session.job_changed.connect(lambda job: self._refresh())
+        session.failed.connect(self._on_failed)
+        self.deformer_panel.radius_hovered.connect(view.show_free_ring)
         tools.chosen_changed.connect(self._show_tool)
         display.changed.connect(self._show_display)
         self._show_tool()
@@ -127,6 +129,7 @@ class MainWindow(QMainWindow):
         session, view, tools = self.session, self.view, self.tools
         select_tool = next(tool for tool in tools.tools.values() if isinstance(tool, SelectTool))
         self.files = FileCommands(self, session, self.toast)
+        self.view_commands = ViewCommands(session, view, self, self.dock)
         return ActionSet(
             self,
             {
@@ -135,7 +138,7 @@ class MainWindow(QMainWindow):
                 "select": SelectCommands(session, select_tool),
                 "handle": HandleCommands(session, view.viewport),
                 "display": DisplayCommands(self.display),
-                "view": ViewCommands(session, view, self, self.dock),
+                "view": self.view_commands,
                 "tool": ToolCommands(tools, select_tool),
                 "help": self,
             },
@@ -257,6 +260,10 @@ class MainWindow(QMainWindow):
         self.display.apply(self.view)
         self.overlay.show_hint(*(() if self._has_hinted else HINT))
         self._refresh()
+
+    def _on_failed(self, title: str, error: Exception) -> None:
+        if self.session.scene is None:
+            self.overlay.show_hint("Drop a splat PLY here, or press Ctrl+O.")
 
     def _on_edit_changed(self) -> None:
         edit = self.session.scene.edit

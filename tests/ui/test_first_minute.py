@@ -101,3 +101,13 @@ def test_right_click_offers_a_menu_and_the_wheel_zooms(driver, qtbot):
     distance = camera.view.distance
     driver.window.view.viewport.camera.zoom(1.2)
     assert camera.view.distance < distance
+
+
+def test_a_click_on_an_end_of_the_corner_axes_looks_from_there(driver, qtbot):
+    viewport = driver.window.view.viewport
+    ends = viewport.triad._ends(viewport.projection)
+    ratio = driver.window.viewport.devicePixelRatioF()
+    driver.click(QPoint(*(int(number) for number in np.rint(ends[2, :2] / ratio))))
+    # The flight ends exactly there; the last direction shows it.
+    qtbot.waitUntil(lambda: abs(viewport.camera.view.direction[2] + 1.0) < 1e-6, timeout=60_000)
+    assert not driver.scene.edit.handles

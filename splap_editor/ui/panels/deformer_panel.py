@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from PySide6.QtCore import QEvent, QObject, Signal
 from PySide6.QtWidgets import QCheckBox, QComboBox, QGridLayout, QLabel, QVBoxLayout, QWidget
 
 from splap_editor.session.edit import Edit
@@ -75,6 +76,9 @@ KERNEL_HINTS = {
 class DeformerPanel(QWidget):
     """Edits method and options; says in plain words what the solver does."""
 
+    radius_hovered = Signal(bool)
+    """The pointer is over the free radius, or has left it: time to show it on screen."""
+
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._session = session
@@ -108,6 +112,7 @@ class DeformerPanel(QWidget):
         self.free_radius.setToolTip("Splats farther from every handle than this stay put, in the file's units.")
         self.free_radius.committed.connect(lambda radius: self._change("Change free radius", free_radius=radius))
         self._radius_label = form_label("Free radius", self.free_radius)
+        self.free_radius.installEventFilter(self)
         reach = QGridLayout()
         reach.setHorizontalSpacing(2 * STEP)
         reach.setVerticalSpacing(STEP)
@@ -124,6 +129,15 @@ class DeformerPanel(QWidget):
         session.scene_changed.connect(self._on_scene_changed)
         session.state_changed.connect(self.show_state)
         self._show()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Tell when the free radius is looked at."""
+        kind = event.type()
+        if kind in (QEvent.Type.Enter, QEvent.Type.FocusIn):
+            self.radius_hovered.emit(True)
+        elif kind == QEvent.Type.FocusOut or (kind == QEvent.Type.Leave and not self.free_radius.hasFocus()):
+            self.radius_hovered.emit(False)
+        return False
 
     def show_timing(self, draw_ms: float) -> None:
         """Show how long the last frame took to draw."""
