@@ -116,7 +116,7 @@ def find_motions(stencils, inverse_moments, dampings, rest, positions, rotations
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract"})
-def carry_triangles(lo, hi, carriers, weights, centers, semi_axes, motions, moved, carried, images):
+def carry_triangles(carriers, weights, centers, semi_axes, motions, moved, lo, hi, carried, images):
     """Move the corners of the inscribed triangles of nodes lo to hi - 1 with their carriers.
 
     Row i - lo of ``images`` becomes centre, major and minor conjugate half-diameter of the moved triangle's Steiner
@@ -160,7 +160,7 @@ def carry_triangles(lo, hi, carriers, weights, centers, semi_axes, motions, move
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract"})
-def map_rings(lo, hi, hops, indptr, indices, centers, semi_axes, positions, rotations, moved, carried, images):
+def map_rings(hops, indptr, indices, centers, semi_axes, positions, rotations, moved, lo, hi, carried, images):
     """Map ellipses by the least-squares affine map of their node's ``hops``-ring; rows as in `carry_triangles`."""
     seen = np.full(len(positions), -1, np.int64)
     ring = np.empty(len(positions), np.int64)

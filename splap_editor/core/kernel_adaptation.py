@@ -1,7 +1,7 @@
 """Splats whose ellipses keep covering the surface when it is deformed."""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Literal
 
 import numpy as np
@@ -184,58 +184,22 @@ def adapt_kernels(
     moved = np.empty(len(positions), np.bool_)
     still = STILL_SHARE * binding.ellipses.scene_scale
     if method == "surface":
-        motions = binding.spare_motions.pop() if binding.spare_motions else np.empty((len(positions), 12))
-        find_motions(
-            binding.stencils,
-            binding.inverse_moments,
-            binding.dampings,
-            rest.means,
-            positions,
-            rotations,
-            still,
-            moved,
-            motions,
+        motions = _spare_motions(binding)
+        stencils = binding.stencils, binding.inverse_moments, binding.dampings
+        find_motions(*stencils, rest.means, positions, rotations, still, moved, motions)
+        carry = partial(carry_triangles, binding.carriers, binding.weights, rest.means, rest.semi_axes, motions, moved)
+        _write_images(carry, rest, rotations, arrays)
+        binding.spare_motions.append(motions)
+    elif method == "affine":
+        find_moved(rest.means, positions, rotations, still, moved)
+        graph = binding.graph
+        carry = partial(
+            map_rings, hops, graph.indptr, graph.indices, rest.means, rest.semi_axes, positions, rotations, moved
         )
+        _write_images(carry, rest, rotations, arrays)
     else:
         find_moved(rest.means, positions, rotations, still, moved)
-    if method == "none":
         _move_centers(rest, positions, moved, arrays)
-    else:
-        # Blocks that stay in the cache between the two loops.
-        carried, images = np.empty(_BLOCK, np.bool_), np.empty((_BLOCK, 9))
-        for lo in range(0, len(positions), _BLOCK):
-            hi = min(lo + _BLOCK, len(positions))
-            if method == "surface":
-                carry_triangles(
-                    lo,
-                    hi,
-                    binding.carriers,
-                    binding.weights,
-                    rest.means,
-                    rest.semi_axes,
-                    motions,
-                    moved,
-                    carried,
-                    images,
-                )
-            else:
-                map_rings(
-                    lo,
-                    hi,
-                    hops,
-                    binding.graph.indptr,
-                    binding.graph.indices,
-                    rest.means,
-                    rest.semi_axes,
-                    positions,
-                    rotations,
-                    moved,
-                    carried,
-                    images,
-                )
-            write_kernels(lo, hi, carried, images, rest, rotations, arrays)
-        if method == "surface":
-            binding.spare_motions.append(motions)
     adapt_inert(binding.inert_carriers, binding.inert_weights, rest, positions, rotations, moved, arrays)
     return AdaptedKernels(binding, arrays)
 
@@ -313,6 +277,22 @@ def _blank_arrays(binding: KernelBinding, out: AdaptedKernels | None) -> KernelA
     if len(out.arrays.means) != N:
         raise ValueError(f"out holds {len(out.arrays.means)} splats, the scene has {N}")
     return out.arrays
+
+
+def _spare_motions(binding):
+    try:
+        return binding.spare_motions.pop()
+    except IndexError:
+        return np.empty((binding.ellipses.n_nodes, 12))
+
+
+def _write_images(carry, rest, rotations, arrays):
+    """Carry the ellipses and write their kernels, in blocks that stay in the processor's cache in between."""
+    carried, images = np.empty(_BLOCK, np.bool_), np.empty((_BLOCK, 9))
+    for lo in range(0, len(rotations), _BLOCK):
+        hi = min(lo + _BLOCK, len(rotations))
+        carry(lo, hi, carried, images)
+        write_kernels(lo, hi, carried, images, rest, rotations, arrays)
 
 
 def _move_centers(rest, positions, moved, arrays):
