@@ -11,6 +11,10 @@ from splap_editor.ui.number_field import NumberField
 from splap_editor.ui.theme import STEP
 
 
+LABEL_PX = 84
+"""All labels in front of fields are as wide, so that fields of several forms line up."""
+
+
 @dataclass(frozen=True)
 class FieldHint:
     """How one field is shown.
@@ -123,6 +127,7 @@ def form_label(text: str, buddy: QWidget) -> QLabel:
     label = QLabel(text)
     label.setProperty("tone", "quiet")
     label.setBuddy(buddy)
+    label.setMinimumWidth(LABEL_PX)
     label.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
     label.setToolTip(buddy.toolTip())
     return label

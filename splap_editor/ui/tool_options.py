@@ -68,7 +68,7 @@ class ToolOptionsBar(QWidget):
             field.setToolTip("Radius of the disc on the surface, of the size of the scene; [ and ] change it too")
             field.setFixedWidth(64)
             field.committed.connect(lambda share: tool.set_radius(share / 100))
-            grip = ScrubLabel("Disc", field)
+            grip = ScrubLabel("Reach", field)
             grip.moved.connect(lambda share: tool.set_radius(share / 100))
             tool.radius_changed.connect(lambda: field.show_value(100 * tool.radius))
             field.show_value(100 * tool.radius)

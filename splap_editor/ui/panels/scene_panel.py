@@ -34,6 +34,7 @@ class ScenePanel(QWidget):
         for row, (name, text) in enumerate(ROWS.items()):
             value = QLabel(wordWrap=True, textInteractionFlags=Qt.TextInteractionFlag.TextSelectableByMouse)
             label = form_label(text, value)
+            label.setMinimumWidth(0)
             label.setAlignment(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft)
             grid.addWidget(label, row, 0)
             grid.addWidget(value, row, 1)
