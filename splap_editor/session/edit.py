@@ -7,63 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.handle_nodes import Region
-from splap_editor.core.rotations import matrices_to_quats, quats_to_matrices
 from splap_editor.core.splat_graph import GraphOptions
 from splap_editor.io.recipe import SolverSpec
+from splap_editor.session.pose import Pose
+from splap_editor.session.timeline import Timeline
 
 HANDLE_COLORS = ("#f2a93b", "#4fb3ff", "#7bd66b", "#e66fb0", "#b18cff", "#ff7a59", "#49d3c2", "#d9d24a")
 """Handle colours in the order they are given out; told apart by the colour-blind too when neighbours in the list."""
-
-
-@dataclass(frozen=True)
-class Pose:
-    """A pose about a centre: ``x → center + translate + R (scale · (x - center))``.
-
-    Parameters
-    ----------
-    translate : 3 floats
-        World units.
-    rotate : 4 floats
-        Unit quaternion, w x y z.
-    scale : float or 3 floats
-        Uniform, or along the world axes before the rotation; greater than 0.
-    """
-
-    translate: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    rotate: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
-    scale: float | tuple[float, float, float] = 1.0
-
-    def __post_init__(self) -> None:
-        if isinstance(self.scale, (list, tuple)):
-            object.__setattr__(self, "scale", tuple(self.scale))
-
-    @property
-    def is_identity(self) -> bool:
-        """Whether the pose leaves everything where it is."""
-        return self == Pose()
-
-    def matrix(self, center: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(4, 4) world transform of the pose about ``center``."""
-        transform = np.eye(4)
-        transform[:3, :3] = quats_to_matrices(np.array([self.rotate]))[0] * np.asarray(self.scale)
-        transform[:3, 3] = center + np.array(self.translate) - transform[:3, :3] @ center
-        return transform
-
-    def moved(self, delta: NDArray[np.float64], center: NDArray[np.float64]) -> "Pose":
-        """Follow the pose by a world similarity.
-
-        Parameters
-        ----------
-        delta : (4, 4) float64
-            Rotation times a uniform positive scale, and a translation.
-        center : (3,) float64
-            The centre that the pose turns about.
-        """
-        scale = float(np.cbrt(np.linalg.det(delta[:3, :3])))
-        turn = delta[:3, :3] / scale @ quats_to_matrices(np.array([self.rotate]))[0]
-        at = delta[:3, :3] @ (center + np.array(self.translate)) + delta[:3, 3] - center
-        quat = matrices_to_quats(turn[None])[0]
-        return Pose(tuple(at.tolist()), tuple(quat.tolist()), (np.asarray(self.scale) * scale).tolist())
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +40,7 @@ class Handle:
     name: str
     color: str
     region: Region
-    pose: Pose = Pose()
+    pose: Pose = field(default_factory=Pose)
     enabled: bool = True
     cage_radius: float | None = float("nan")
 
@@ -121,6 +71,8 @@ class Edit:
         Neighbourhood of the affine adaptation.
     blending : str
         ``"dual-quaternion"`` or ``"linear"``, for bounded biharmonic weights.
+    timeline : Timeline
+        Poses at other frames than the one shown.
     """
 
     handles: tuple[Handle, ...] = ()
@@ -132,6 +84,7 @@ class Edit:
     adaptation: str = "surface"
     hops: int = 1
     blending: str = "dual-quaternion"
+    timeline: Timeline = field(default_factory=Timeline)
 
     @property
     def active_handles(self) -> tuple[Handle, ...]:
@@ -176,8 +129,9 @@ class Edit:
         )
 
     def next_handle_id(self) -> int:
-        """Give an id that no handle of this edit has."""
-        return max((handle.handle_id for handle in self.handles), default=0) + 1
+        """Give an id that no handle of this edit has, nor any of its keys."""
+        keyed = (handle_id for key in self.timeline.keys for handle_id in key.poses)
+        return max((*(handle.handle_id for handle in self.handles), *keyed), default=0) + 1
 
 
 def binds_like(a: Edit, b: Edit) -> bool:

@@ -20,6 +20,7 @@ from splap_editor.session.edit import HANDLE_COLORS, Edit, Handle, Pose, binds_l
 from splap_editor.session.export_report import ExportReport, export_report
 from splap_editor.session.history import History
 from splap_editor.session.jobs import Job, Post, Worker
+from splap_editor.session.keyframes import auto_keyed_edit
 from splap_editor.session.pipeline import Surface, deformer_of, handles_of, kernels_of, surface_of
 from splap_editor.session.recipe_edit import edit_of, recipe_of
 from splap_editor.session.scene import Scene
@@ -80,13 +81,25 @@ class Session:
 
     # ------------------------------------------------------------------ files
 
-    def open(self, path: Path, *, layout: str | None = None) -> None:
-        """Read a splat PLY in the background; the scene on screen stays until it is read."""
+    def open(self, path: Path, *, layout: str | None = None, restore: Callable[[Scene], None] | None = None) -> None:
+        """Read a splat PLY in the background; the scene on screen stays until it is read.
+
+        Parameters
+        ----------
+        path : Path
+        layout : str, optional
+            Read it as this layout instead of the recognised one.
+        restore : callable, optional
+            Given the new scene, on the worker, before anyone else knows it: to put a saved edit in place.
+        """
 
         def read(job: Job) -> Scene:
             file = read_ply(path, layout=layout, progress=job.progress("reading"))
             job.report(1.0, "occupancy")
-            return Scene(file, occupancy_ellipses(file.splats))
+            scene = Scene(file, occupancy_ellipses(file.splats))
+            if restore is not None:
+                restore(scene)
+            return scene
 
         cancels = ("open", "prepare", "bind", "pose")
         self._submit("open", f"Opening {path.name}", read, self._show, cancels=cancels)
@@ -121,7 +134,7 @@ class Session:
     def change_edit(self, edit: Edit, label: str) -> None:
         """Replace the edit as one undoable step."""
         scene = self._scene()
-        self.history.push(ChangeEdit(scene, scene.edit, edit, label))
+        self.history.push(ChangeEdit(scene, scene.edit, auto_keyed_edit(scene.edit, edit), label))
 
     def change_mask(self, name: str, mask: NDArray[np.bool_], label: str) -> None:
         """Replace ``"selection"`` or ``"hidden"`` as one undoable step; no step when nothing changes."""
