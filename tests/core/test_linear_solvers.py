@@ -20,6 +20,14 @@ def test_solution_is_that_of_the_dense_twin(shape):
     np.testing.assert_allclose(x, np.linalg.solve(A.toarray(), b), atol=1e-10)
 
 
+@pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 9, 40])
+def test_dense_matrices_whose_columns_all_run_together_are_solved_too(n):
+    A = np.random.default_rng(n).standard_normal((n, n))
+    A = A @ A.T + np.eye(n)
+    b = np.random.default_rng(0).standard_normal((n, 3))
+    np.testing.assert_allclose(SpdFactor(sp.csr_matrix(A)).solve(b), np.linalg.solve(A, b), atol=1e-10)
+
+
 def test_solving_leaves_the_right_hand_side_alone():
     b = np.ones((60, 3))
     SpdFactor(_spd(60, 1)).solve(b)
