@@ -127,7 +127,8 @@ def rotation_quaternion(a00, a01, a02, a10, a11, a12, a20, a21, a22):
             break
         step = (cubic * top + c0) / slope
         top -= step
-        if abs(step) < 1e-15:
+        # Convergence is quadratic: what is left after this step is below rounding.
+        if abs(step) < 1e-9:
             break
     m00, m11, m22, m33 = n00 - top, n11 - top, n22 - top, n33 - top
     # Every column of the adjugate of N - top I is a multiple of the eigenvector: take the longest.
