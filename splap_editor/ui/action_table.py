@@ -302,6 +302,9 @@ ACTIONS: tuple[ActionSpec, ...] = (
         menu="&View",
         checkable=True,
     ),
+    A("view.up_z", "&Z up", (), "", "Turn about Z.", "scene", "&View/&Up", group="up", checkable=True),
+    A("view.up_y", "&Y up", (), "", "Turn about Y.", "scene", "&View/&Up", group="up", checkable=True),
+    A("view.down_y", "Y &down", (), "", "Turn about Y, upside down.", "scene", "&View/&Up", group="up", checkable=True),
     A("view.panels", "Panel&s", ("N",), "panel", "Show or hide the panels.", menu="&View", checkable=True, breaks=True),
     A("view.full_screen", "F&ull screen", ("F11",), "", "Fill the screen.", menu="&View", checkable=True),
     A(

@@ -251,6 +251,8 @@ class MainWindow(QMainWindow):
         self.display.apply(self.view)
 
     def _on_scene_changed(self) -> None:
+        up = tuple(self.view.viewport.camera.world_up)
+        self.actions_.check({(0.0, 0.0, 1.0): "view.up_z", (0.0, -1.0, 0.0): "view.down_y"}.get(up, "view.up_y"))
         scene = self.session.scene
         scene.selection_changed.connect(self._refresh)
         scene.hidden_changed.connect(self._refresh)

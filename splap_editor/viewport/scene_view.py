@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from splap_editor.core.kernel_adaptation import AdaptedKernels
 from splap_editor.core.rotations import quats_to_matrices
 from splap_editor.core.spherical_harmonics import view_colors
+from splap_editor.core.splats import Splats
 from splap_editor.session.edit import Handle
 from splap_editor.session.jobs import Job
 from splap_editor.session.scene import Scene
@@ -145,6 +146,7 @@ class SceneView:
         scene.active_handles_changed.connect(self._show_handles)
         self._rest = splat_glyphs(scene.splats)
         self.viewport.splats.load(self._rest, base_colors(scene.splats))
+        self.viewport.camera.world_up = np.array(suggested_up(scene.splats))
         self.viewport.reset_camera()
         self._show_flags()
         self._show_handles()
@@ -258,3 +260,8 @@ def _center(handle: Handle) -> NDArray[np.float64]:
 
 def _rgb(color: str) -> tuple[int, int, int]:
     return int(color[1:3], 16), int(color[3:5], 16), int(color[5:7], 16)
+
+
+def suggested_up(splats: Splats) -> tuple[float, float, float]:
+    """Guess which way is up: -Y for captures posed by structure from motion, as three-scale files mostly are, else Z."""
+    return (0.0, 0.0, 1.0) if splats.n_scales == 2 else (0.0, -1.0, 0.0)
