@@ -10,24 +10,11 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from splap_editor.core.ellipse_offset import touch_scales
-from splap_editor.core.ellipse_tree import EllipseTree, ellipse_tree, nearest_touches, offset_pairs
+from splap_editor.core.ellipse_tree import EllipseTree, ellipse_tree, offset_pairs
 from splap_editor.core.occupancy import Ellipses
-from splap_editor.core.progress import Progress, no_progress, part_of
+from splap_editor.core.progress import Progress, no_progress
+from splap_editor.core.touch_rule import edge_keys, labels_by_size, touch_edges
 
-N_PARTNERS = 8
-"""An edge is among so many smallest touch scales of both its ends."""
-
-PEER_RATIO = 3.0
-"""A splat ranks its contacts with splats of at most so many times its reach; else the few giants that cover
-everything would be everyone's best contacts."""
-
-FRAGMENT_SIZE = 32
-"""A component of at most so many nodes may be joined to another by growing its ellipses."""
-
-FRAGMENT_REACH = 2.0
-"""Largest touch scale at which a fragment is joined."""
-
-_CHUNK = 16384
 _LENGTH_FLOOR = 1e-9
 
 
@@ -39,7 +26,7 @@ class GraphOptions:
     ----------
     rule : "touch" or "paper"
         ``touch`` (default): each splat's best contacts, as far as they are
-        mutual, joined up by the best contacts between what is left apart.
+        mutual, and the best contacts between what that leaves apart.
         ``paper``: every pair with a normal-wise offset of at most ε.
     epsilon : float
         Tolerance along the normals in units of the scene scale.
@@ -107,7 +94,7 @@ class SplatGraph:
     @cached_property
     def components(self) -> NDArray[np.int32]:
         """(n,) component of each node, numbered by falling size from 0; equal sizes by their first node."""
-        return _labels_by_size(connected_components(self.matrix(), directed=False)[1])
+        return labels_by_size(connected_components(self.matrix(), directed=False)[1])
 
     @cached_property
     def edges(self) -> NDArray[np.int32]:
@@ -130,11 +117,7 @@ def splat_graph(
     in one direction at least. Where two surfaces pass near each other, or splats
     overhang the border of theirs, it also joins what only touches with its rim.
 
-    The touch rule ranks contacts by *touch scale* instead, the factor at which
-    two ellipses just meet: an edge is kept if it is among the 8 smallest of both
-    its ends and at most 1. The components that leaves are joined as a minimum
-    spanning forest by touch scale joins them, up to 1, so that whatever touches
-    is connected; and fragments of up to 32 nodes up to 2, by their best contact.
+    The touch rule, see `touch_edges`, keeps each splat's best contacts instead.
 
     Parameters
     ----------
@@ -167,12 +150,12 @@ def splat_graph(
     if options.rule == "paper":
         edges, touch = _offset_edges(tree, epsilon, progress), None
     else:
-        edges, touch = _touch_edges(tree, epsilon, progress)
+        edges, touch = touch_edges(tree, epsilon, progress)
     if len(add):
         edges = np.concatenate([edges, add])
         touch = None if touch is None else np.concatenate([touch, touch_scales(ellipses, add, epsilon)])
     if len(cut):
-        kept = ~np.isin(_edge_keys(edges, ellipses.n_nodes), _edge_keys(cut, ellipses.n_nodes))
+        kept = ~np.isin(edge_keys(edges, ellipses.n_nodes), edge_keys(cut, ellipses.n_nodes))
         edges, touch = edges[kept], None if touch is None else touch[kept]
     graph = _symmetric(ellipses, edges, touch, epsilon)
     progress(1.0)
@@ -192,97 +175,6 @@ def _offset_edges(tree: EllipseTree, epsilon: float, progress: Progress) -> NDAr
         start = end
         progress(0.9 * start / n)
     return np.concatenate(chunks)
-
-
-def _touch_edges(
-    tree: EllipseTree, epsilon: float, progress: Progress
-) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """(E, 2) edges of the touch rule and their touch scales."""
-    n = len(tree.nodes)
-    everything = np.arange(n)
-    partners, scales = _nearest(
-        tree, everything, everything, epsilon, 1.0, PEER_RATIO, N_PARTNERS, part_of(progress, 0.0, 0.8)
-    )
-    edges, touch = _mutual(tree, partners, scales)
-    labels = connected_components(_adjacency(edges, n), directed=False)[1]
-    labels, more, more_touch = _joined(tree, labels, epsilon, 1.0, n, part_of(progress, 0.8, 0.9))
-    _, last, last_touch = _joined(tree, labels, epsilon, FRAGMENT_REACH, FRAGMENT_SIZE, part_of(progress, 0.9, 1.0))
-    return np.concatenate([edges, more, last]), np.concatenate([touch, more_touch, last_touch])
-
-
-def _mutual(
-    tree: EllipseTree, partners: NDArray[np.int32], scales: NDArray[np.float64]
-) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """(E, 2) contacts that rank high enough at both ends, once each, and their touch scales."""
-    n = len(tree.nodes)
-    listed = partners >= 0
-    owners = np.repeat(np.arange(n), listed.sum(axis=1))
-    others = tree.places[partners[listed]]
-    touch = scales[listed]
-    # An ellipse that is no peer of its partner does not appear in the partner's list, but must rank as high as if.
-    foreign = (tree.reaches[owners] > PEER_RATIO * tree.reaches[others]) & (touch <= scales[others, -1])
-    pairs = np.stack([tree.nodes[owners], tree.nodes[others]], axis=1).astype(np.int32)
-    # A contact that both ends list appears twice.
-    keys = _edge_keys(pairs, n)
-    order = np.argsort(keys, kind="stable")
-    kept = order[1:][keys[order[1:]] == keys[order[:-1]]]
-    kept = np.concatenate([kept, np.flatnonzero(foreign)])
-    return np.sort(pairs[kept], axis=1), touch[kept]
-
-
-def _joined(
-    tree: EllipseTree, labels: NDArray[np.int32], epsilon: float, limit: float, size: int, progress: Progress
-) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float64]]:
-    """Join components by Borůvka's rounds: each of at most ``size`` nodes, except the largest, by its best contact.
-
-    Returns the labels that result, the new edges and their touch scales. Contacts are ordered by touch scale, then
-    nodes, so no round closes a circle.
-    """
-    edges, touch = [np.empty((0, 2), np.int32)], [np.empty(0)]
-    n_left = len(labels)
-    while True:
-        labels = _labels_by_size(labels)
-        sizes = np.bincount(labels)
-        asking = (labels != 0) & (sizes[labels] <= size)
-        queries = np.sort(tree.places[asking])
-        if not len(queries) or len(sizes) == n_left:
-            return labels, np.concatenate(edges), np.concatenate(touch)
-        n_left = len(sizes)
-        partners, scales = _nearest(tree, queries, labels[tree.nodes], epsilon, limit, np.inf, 1, progress)
-        found = partners[:, 0] >= 0
-        pairs = np.sort(np.stack([tree.nodes[queries], partners[:, 0]], axis=1)[found], axis=1).astype(np.int32)
-        own = labels[tree.nodes[queries]][found]
-        order = np.lexsort((pairs[:, 1], pairs[:, 0], scales[found, 0], own))
-        best = order[np.flatnonzero(np.diff(own[order], prepend=-1))]
-        _, first = np.unique(_edge_keys(pairs[best], len(labels)), return_index=True)
-        edges.append(pairs[best[first]])
-        touch.append(scales[found, 0][best[first]])
-        merged = connected_components(_adjacency(labels[edges[-1]], n_left), directed=False)[1]
-        labels = merged[labels]
-
-
-def _nearest(
-    tree: EllipseTree,
-    queries: NDArray[np.int64],
-    labels: NDArray[np.integer],
-    epsilon: float,
-    limit: float,
-    ratio: float,
-    m: int,
-    progress: Progress,
-) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """(Q, m) best contacts of the queried places, chunk by chunk."""
-    partners = np.empty((len(queries), m), np.int32)
-    scales = np.empty((len(queries), m))
-    ranges = tree.label_ranges(labels)
-    labels = labels.astype(np.int32)
-    for start in range(0, len(queries), _CHUNK):
-        chunk = slice(start, start + _CHUNK)
-        nearest_touches(
-            queries[chunk], *tree.arrays, labels, ranges, epsilon, limit, ratio, partners[chunk], scales[chunk]
-        )
-        progress(min(1.0, (start + _CHUNK) / len(queries)))
-    return partners, scales
 
 
 def _node_pairs(ellipses: Ellipses, rows: tuple[tuple[int, int], ...], name: str) -> NDArray[np.int32]:
@@ -306,31 +198,12 @@ def _listed(rows: NDArray[np.int64]) -> str:
     return ", ".join(map(str, rows[:5])) + (f" and {len(rows) - 5} more" if len(rows) > 5 else "")
 
 
-def _edge_keys(pairs: NDArray[np.integer], n_nodes: int) -> NDArray[np.int64]:
-    """One number per undirected edge."""
-    return np.minimum(pairs[:, 0], pairs[:, 1]).astype(np.int64) * n_nodes + np.maximum(pairs[:, 0], pairs[:, 1])
-
-
-def _adjacency(edges: NDArray[np.integer], n: int) -> sp.csr_array:
-    return sp.csr_array((np.ones(len(edges), np.int8), (edges[:, 0], edges[:, 1])), shape=(n, n))
-
-
-def _labels_by_size(labels: NDArray[np.integer]) -> NDArray[np.int32]:
-    """Renumber components by falling size; equal sizes by their first node."""
-    sizes = np.bincount(labels)
-    first = np.full(len(sizes), len(labels))
-    np.minimum.at(first, labels, np.arange(len(labels)))
-    rank = np.empty(len(sizes), np.int32)
-    rank[np.lexsort((first, -sizes))] = np.arange(len(sizes))
-    return rank[labels]
-
-
 def _symmetric(
     ellipses: Ellipses, edges: NDArray[np.int32], touch: NDArray[np.float64] | None, epsilon: float
 ) -> SplatGraph:
     """Lay undirected edges out as compressed rows, each at both ends."""
     n = ellipses.n_nodes
-    _, once = np.unique(_edge_keys(edges, n), return_index=True)
+    _, once = np.unique(edge_keys(edges, n), return_index=True)
     edges = edges[once]
     # Zero is a legal touch scale but no legal entry of a sparse matrix: carry edge numbers instead.
     numbers = np.arange(len(edges), dtype=np.int32)

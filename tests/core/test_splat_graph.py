@@ -6,7 +6,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from splap_editor.core import splat_graph as module
+from splap_editor.core import touch_rule as module
 from splap_editor.core.ellipse_offset import normal_offsets, touch_scales
 from splap_editor.core.occupancy import occupancy_ellipses
 from splap_editor.core.progress import Cancelled
@@ -44,7 +44,8 @@ def test_the_touch_rule_is_its_twin(scene):
     twin = touch_rule(
         touch,
         ellipses.reaches,
-        n_partners=module.N_PARTNERS,
+        n_best=module.N_BEST,
+        n_good=module.N_GOOD,
         peer_ratio=module.PEER_RATIO,
         fragment_size=module.FRAGMENT_SIZE,
         fragment_reach=module.FRAGMENT_REACH,
@@ -184,7 +185,7 @@ def test_one_splat_in_a_hundred_of_a_hundredfold_size_costs_no_memory_to_speak_o
     tracemalloc.stop()
     # Every giant lies within reach of every splat: 160,000 pairs, of which only the best are ever held.
     assert peak < 4000 * 1500
-    assert graph.degrees.max() <= 3 * module.N_PARTNERS
+    assert graph.degrees.max() <= 3 * module.N_GOOD
     plain = splat_graph(occupancy_ellipses(scene))
     # The others hold on to each other as without them.
     assert graph.n_edges > 0.9 * plain.n_edges

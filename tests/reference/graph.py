@@ -82,18 +82,25 @@ def touch_rule(
     touch: NDArray[np.float64],
     reaches: NDArray[np.float64],
     *,
-    n_partners: int,
+    n_best: int,
+    n_good: int,
     peer_ratio: float,
     fragment_size: int,
     fragment_reach: float,
 ) -> set[tuple[int, int]]:
     """Edges of the touch rule from an (n, n) matrix of touch scales, by sorting everything."""
     n = len(touch)
-    worst = np.full(n, 1.0)
+    best, good = np.full(n, np.inf), np.full(n, np.inf)
     for i in range(n):
-        peers = sorted(touch[i, j] for j in range(n) if j != i and reaches[j] <= peer_ratio * reaches[i])
-        worst[i] = min(1.0, peers[n_partners - 1]) if len(peers) >= n_partners else 1.0
-    edges = {(i, j) for i, j in all_pairs(n) if touch[i, j] <= min(worst[i], worst[j])}
+        peers = sorted(f for f, reach in zip(np.delete(touch[i], i), np.delete(reaches, i), strict=True)
+                       if reach <= peer_ratio * reaches[i] and f <= 1.0)  # fmt: skip
+        best[i] = peers[n_best - 1] if len(peers) >= n_best else np.inf
+        good[i] = peers[n_good - 1] if len(peers) >= n_good else np.inf
+    edges = {
+        (i, j)
+        for i, j in all_pairs(n)
+        if touch[i, j] <= min(1.0, good[i], good[j]) and touch[i, j] <= max(best[i], best[j])
+    }
     pairs = sorted((touch[i, j], i, j) for i, j in all_pairs(n) if touch[i, j] <= fragment_reach)
     for limit, size in ((1.0, n), (fragment_reach, fragment_size)):
         while True:
