@@ -6,7 +6,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-# Below this adjugate size (of a unit matrix) the largest eigenvalue is nearly double and Newton's root too inexact.
+# Below this adjugate size (of a unit matrix) the largest eigenvalue is nearly double and the root found too inexact.
 _NEARLY_DOUBLE = 1e-5
 
 
@@ -40,7 +40,7 @@ def fit_rotations(covariances: NDArray[np.float64]) -> NDArray[np.float64]:
        SGP 2007, Eq. 6.
     .. [2] Theobald, "Rapid calculation of RMSDs using a quaternion-based
        characteristic polynomial", Acta Cryst. A61, 2005: the largest root of
-       Horn's quartic by Newton's method.
+       Horn's quartic, here by Halley's method instead of Newton's.
     """
     covariances = np.ascontiguousarray(covariances, np.float64)
     if covariances.ndim != 3 or covariances.shape[1:] != (3, 3):
@@ -96,7 +96,7 @@ def rotation_quaternion(a00, a01, a02, a10, a11, a12, a20, a21, a22):
 
     The quaternion is the eigenvector of Horn's symmetric traceless 4 × 4 matrix for its largest
     eigenvalue. Scaled to ``|A| = 1`` the characteristic polynomial is ``t⁴ - 2 t² - 8 det(A) t + det(N)``,
-    whose largest root lies in [1, √3]; Newton's method from above falls on it monotonically.
+    whose largest root lies in [1, √3]; all roots are real, so Halley's method from above falls on it monotonically.
     """
     square = a00 * a00 + a01 * a01 + a02 * a02 + a10 * a10 + a11 * a11 + a12 * a12 + a20 * a20 + a21 * a21 + a22 * a22
     if square < 1e-280:
@@ -121,14 +121,15 @@ def rotation_quaternion(a00, a01, a02, a10, a11, a12, a20, a21, a22):
     top = min(1.7320508075688774, math.sqrt(1.0 + math.sqrt(max(0.0, 1.0 - c0))) + 0.5 * abs(c1))
     for _ in range(50):
         square = top * top
-        cubic = (square - 2.0) * top + c1
-        slope = 2.0 * square * top + (square - 2.0) * top + cubic
-        if slope <= 0.0:
+        value = ((square - 2.0) * top + c1) * top + c0
+        slope = 4.0 * (square - 1.0) * top + c1
+        divisor = 2.0 * slope * slope - value * (12.0 * square - 4.0)
+        if divisor <= 0.0:
             break
-        step = (cubic * top + c0) / slope
+        step = 2.0 * value * slope / divisor
         top -= step
-        # Convergence is quadratic: what is left after this step is below rounding.
-        if abs(step) < 1e-9:
+        # Convergence is cubic: what is left after this step is below rounding.
+        if abs(step) < 1e-7:
             break
     m00, m11, m22, m33 = n00 - top, n11 - top, n22 - top, n33 - top
     # Every column of the adjugate of N - top I is a multiple of the eigenvector: take the longest.
