@@ -17,6 +17,7 @@ STAGES = {
     "geodesics": "measuring along the surface",
     "laplacian": "weighing neighbours",
     "kernels": "attaching splats",
+    "coarse model": "sketching the shape for live drags",
     "binding": "getting ready to bend",
     "settling": "settling",
 }

@@ -351,7 +351,7 @@ class MainWindow(QMainWindow):
         self.tools.cancel()
         self.session.close()
         self.view.close()
-        self.viewport.close()
+        self.viewport.release()
         event.accept()
 
     def _close_for_good(self) -> None:
