@@ -59,6 +59,13 @@ class JsonObject:
             raise self.refuse(key, "text in quotes")
         return value
 
+    def flag(self, key: str, default: bool) -> bool:
+        """True or false."""
+        value = self._value.get(key, default)
+        if not isinstance(value, bool):
+            raise self.refuse(key, "true or false")
+        return value
+
     def choice(self, key: str, choices: tuple[str, ...], default: str) -> str:
         """One of some strings."""
         value = self._value.get(key, default)
@@ -149,6 +156,19 @@ def parsed_json(data: bytes, error: Error) -> Any:
         raise error("it is not text in UTF-8") from None
     except RecursionError:
         raise error("it is nested too deeply") from None
+
+
+def json_lines(value: dict[str, Any]) -> str:
+    """JSON of an object, with a line for each key and for each item of its lists."""
+
+    def line(item: Any) -> str:
+        return json.dumps(item, ensure_ascii=False, allow_nan=False)
+
+    lines = []
+    for key, item in value.items():
+        parts = ",\n  ".join(line(part) for part in item) if isinstance(item, list) else ""
+        lines.append(f' "{key}": ' + (f"[\n  {parts}\n ]" if parts else line(item)))
+    return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
 def shown(value: Any) -> str:

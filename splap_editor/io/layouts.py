@@ -13,6 +13,9 @@ FLAT_LOG_SCALE = -1e9
 """Log-scales below this stand for an extent of exactly zero (trainers write -1e10)."""
 
 
+_CHOSEN = "chosen by hand"
+
+
 @dataclass(frozen=True)
 class Layout:
     """What a trainer's columns mean.
@@ -40,6 +43,11 @@ class Layout:
     n_scales: int = 3
     bound: bool = False
 
+    @property
+    def is_chosen(self) -> bool:
+        """Whether a person chose it, against what would have been recognised."""
+        return self.reason == _CHOSEN
+
 
 LAYOUTS: dict[str, Layout] = {
     layout.name: layout
@@ -48,7 +56,7 @@ LAYOUTS: dict[str, Layout] = {
         Layout("2dgs", "two scales per splat", normal_axis=2, n_scales=2),
         Layout("spikinggs", "flat splats with opacity between 0 and 1", normal_axis=2, activated_opacity=True),
         Layout("gaussian-surfels", "flat splats, scale_2 is -1e10", normal_axis=2),
-        Layout("pgsr", "chosen by hand"),
+        Layout("pgsr", _CHOSEN),
         Layout("gof", "a filter_3D column"),
         Layout("rade-gs", "a filter_3D column"),
         Layout("sugar", "one and the same scale_0 everywhere", normal_axis=0),
@@ -127,7 +135,7 @@ def _chosen_layout(table: PlyTable, chosen: str) -> Layout:
         raise PlyError(f"{table.name} holds {held} columns: it cannot be read as {chosen!r}.")
     if layout.n_scales == 3 and not packed and "scale_2" not in table.columns:
         raise PlyError(f"{table.name} has two scales per splat: it can only be read as '2dgs', not as {chosen!r}.")
-    return _with_reason(layout, "chosen by hand")
+    return _with_reason(layout, _CHOSEN)
 
 
 def _name_by_columns(columns: dict) -> tuple[str, str] | None:

@@ -1,6 +1,5 @@
 """Recipes: an edit as JSON, for scripts and for the window alike."""
 
-import json
 import math
 import os
 from pathlib import Path
@@ -9,17 +8,29 @@ from typing import Any
 import numpy as np
 
 from splap_editor.io.atomic_file import atomic_file
-from splap_editor.io.json_object import JsonObject, parsed_json, shown
-from splap_editor.io.recipe_specs import DEFAULT_RADIUS, GraphSpec, HandleSpec, PinSpec, Recipe, SolverSpec, Vector
+from splap_editor.io.json_object import JsonObject, json_lines, parsed_json, shown
+from splap_editor.io.recipe_specs import (
+    DEFAULT_RADIUS,
+    GraphSpec,
+    HandleSpec,
+    PinSpec,
+    PoseSpec,
+    Recipe,
+    SolverSpec,
+    Vector,
+)
 
 __all__ = [
     "DEFAULT_RADIUS",
     "GraphSpec",
     "HandleSpec",
     "PinSpec",
+    "PoseSpec",
     "Recipe",
     "RecipeError",
     "SolverSpec",
+    "pose_from_json",
+    "pose_to_json",
     "read_recipe",
     "recipe_from_json",
     "recipe_to_json",
@@ -82,7 +93,7 @@ def write_recipe(path: str | os.PathLike[str], recipe: Recipe) -> None:
     recipe_from_json(held)
     try:
         with atomic_file(path) as file:
-            file.write(_text(held).encode())
+            file.write(json_lines(held).encode())
     except OSError as error:
         raise RecipeError(f"{path} cannot be written: {error.strerror or error}. Choose another place.") from error
 
@@ -152,14 +163,7 @@ def _region(region: JsonObject) -> tuple[Vector | None, float | None, tuple[int,
 
 def _handle(handle: JsonObject, index: int) -> HandleSpec:
     center, radius, rows = _region(handle)
-    rotate = handle.vector("rotate", 4, HandleSpec.rotate)
-    length = math.hypot(*rotate)
-    if not 0 < length < math.inf:
-        raise handle.refuse("rotate", "a quaternion w, x, y, z that is not zero")
-    if abs(length - 1) > 1e-12:
-        # Twice, since the length of very short ones is imprecise.
-        rotate = tuple(part / length for part in rotate)
-        rotate = tuple(part / math.hypot(*rotate) for part in rotate)
+    pose = pose_from_json(handle)
     cage_radius = None
     if not handle.is_null("cage_radius"):
         cage_radius = handle.number("cage_radius", above=0) if "cage_radius" in handle else DEFAULT_RADIUS
@@ -168,21 +172,39 @@ def _handle(handle: JsonObject, index: int) -> HandleSpec:
         center=center,
         radius=radius,
         rows=rows,
-        translate=handle.vector("translate", 3, HandleSpec.translate),
-        rotate=rotate,
-        scale=_scale(handle),
+        translate=pose.translate,
+        rotate=pose.rotate,
+        scale=pose.scale,
         cage_radius=cage_radius,
     )
+
+
+def pose_from_json(pose: JsonObject) -> PoseSpec:
+    """Pose of an object with the keys translate, rotate and scale, each at rest where it is missing."""
+    rotate = pose.vector("rotate", 4, HandleSpec.rotate)
+    length = math.hypot(*rotate)
+    if not 0 < length < math.inf:
+        raise pose.refuse("rotate", "a quaternion w, x, y, z that is not zero")
+    if abs(length - 1) > 1e-12:
+        # Twice, since the length of very short ones is imprecise.
+        rotate = tuple(part / length for part in rotate)
+        rotate = tuple(part / math.hypot(*rotate) for part in rotate)
+    return PoseSpec(pose.vector("translate", 3, HandleSpec.translate), rotate, _scale(pose))
+
+
+def pose_to_json(pose: PoseSpec) -> dict[str, Any]:
+    """Plain objects of a pose; what is at rest is left out."""
+    return _without_defaults(pose, PoseSpec())
 
 
 def _scale(handle: JsonObject) -> float | Vector:
     """One factor, or one for each world axis."""
     try:
         return handle.number("scale", HandleSpec.scale, above=0)
-    except RecipeError:
+    except ValueError:
         try:
             scale = handle.vector("scale", 3)
-        except RecipeError:
+        except ValueError:
             scale = (0.0,)
     if min(scale) <= 0:
         raise handle.refuse("scale", "a number greater than 0, or three of them")
@@ -229,16 +251,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, tuple | list | np.ndarray):
         return [_plain(item) for item in value]
     return value.item() if isinstance(value, np.generic) else value
-
-
-def _text(value: dict[str, Any]) -> str:
-    """JSON with a line for each key, handle and pin."""
-
-    def line(item: Any) -> str:
-        return json.dumps(item, ensure_ascii=False, allow_nan=False)
-
-    lines = []
-    for key, item in value.items():
-        parts = ",\n  ".join(line(part) for part in item) if isinstance(item, list) else ""
-        lines.append(f' "{key}": ' + (f"[\n  {parts}\n ]" if parts else line(item)))
-    return "{\n" + ",\n".join(lines) + "\n}\n"

@@ -67,6 +67,25 @@ class PinSpec:
 
 
 @dataclass(frozen=True)
+class PoseSpec:
+    """How far a handle is moved, turned and scaled about its centre.
+
+    Parameters
+    ----------
+    translate : 3 floats
+        World units.
+    rotate : 4 floats
+        Unit quaternion, w x y z.
+    scale : float or 3 floats
+        Uniform, or along the world axes before the rotation; greater than 0.
+    """
+
+    translate: Vector = (0.0, 0.0, 0.0)
+    rotate: Quaternion = (1.0, 0.0, 0.0, 0.0)
+    scale: float | Vector = 1.0
+
+
+@dataclass(frozen=True)
 class HandleSpec:
     """Splats that are moved, and where to.
 

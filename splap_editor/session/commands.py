@@ -1,5 +1,6 @@
 """The undoable steps: each a swap between a value before and a value after."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,6 +69,31 @@ class ChangeMask:
     def _set(self, packed: NDArray[np.uint8]) -> None:
         mask = np.unpackbits(packed, count=self._scene.splats.n_splats).astype(bool)
         getattr(self._scene, f"set_{self._name}")(mask)
+
+
+class ChangeSelectionSets:
+    """A selection was kept by name, or forgotten."""
+
+    def __init__(self, scene: Scene, after: Mapping[str, NDArray[np.bool_]], label: str) -> None:
+        self.label = label
+        self._scene = scene
+        self._before = scene.selection_sets
+        self._after = dict(after)
+
+    @property
+    def nbytes(self) -> int:
+        """Masks that only the state before or after holds."""
+        masks = {id(mask): mask.nbytes for sets in (self._before, self._after) for mask in sets.values()}
+        shared = {id(mask) for mask in self._before.values()} & {id(mask) for mask in self._after.values()}
+        return sum(nbytes for key, nbytes in masks.items() if key not in shared)
+
+    def do(self) -> None:
+        """Put the changed sets in place."""
+        self._scene.set_selection_sets(self._after)
+
+    def undo(self) -> None:
+        """Put the sets from before back."""
+        self._scene.set_selection_sets(self._before)
 
 
 def _regions(edit: Edit):

@@ -11,13 +11,13 @@ from splap_editor.io.recipe import GraphSpec, HandleSpec, PinSpec, Recipe, Recip
 from splap_editor.session.edit import HANDLE_COLORS, Edit, Handle, Pose
 
 
-def recipe_of(edit: Edit) -> Recipe:
-    """Write an edit as a recipe; disabled handles are left out, since they do nothing."""
+def recipe_of(edit: Edit, *, with_disabled: bool = False) -> Recipe:
+    """Write an edit as a recipe; disabled handles are left out unless wanted, since they do nothing."""
     return Recipe(
         method=edit.method,
         graph=GraphSpec(**asdict(edit.graph)),
         free_radius=edit.free_radius,
-        handles=tuple(_handle_spec(handle) for handle in edit.active_handles),
+        handles=tuple(_handle_spec(handle) for handle in (edit.handles if with_disabled else edit.active_handles)),
         pins=tuple(PinSpec(*_place(pin)) for pin in edit.pins),
         solver=edit.solver,
         adaptation=edit.adaptation,

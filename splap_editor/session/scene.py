@@ -1,5 +1,7 @@
 """The open file and what the artist made of it. Only the main thread touches it."""
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,6 +33,7 @@ class Scene:
         self.presented: object = None
         self.selection = np.zeros(file.splats.n_splats, bool)
         self.hidden = np.zeros(file.splats.n_splats, bool)
+        self.selection_sets: Mapping[str, NDArray[np.bool_]] = {}
         self.active_handles: tuple[int, ...] = ()
         self.surface_changed = Signal()
         self.edit_changed = Signal()
@@ -38,6 +41,7 @@ class Scene:
         self.pose_changed = Signal()
         self.selection_changed = Signal()
         self.hidden_changed = Signal()
+        self.selection_sets_changed = Signal()
         self.active_handles_changed = Signal()
 
     @property
@@ -92,6 +96,11 @@ class Scene:
         """Replace the (N,) mask of splats that are neither drawn nor picked."""
         self.hidden = hidden
         self.hidden_changed.emit()
+
+    def set_selection_sets(self, sets: Mapping[str, NDArray[np.bool_]]) -> None:
+        """Replace the selections kept by name, each an (N,) mask."""
+        self.selection_sets = sets
+        self.selection_sets_changed.emit()
 
     def set_active_handles(self, handle_ids: tuple[int, ...]) -> None:
         """Choose the handles that gizmo and keys act on."""

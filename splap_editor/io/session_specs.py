@@ -1,0 +1,110 @@
+"""What a session file says: an edit, how it is looked at, and the PLY it belongs to, as plain values."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from splap_editor.io.recipe_specs import PoseSpec, Recipe, Vector
+
+Scalar = str | bool | int | float
+
+
+@dataclass(frozen=True)
+class PlySpec:
+    """The splat PLY that a session belongs to.
+
+    Parameters
+    ----------
+    path : str
+        Relative to the folder of the session file, with forward slashes; absolute where there is no such way.
+    content_hash : str
+        As `splap_editor.io.session_file.content_hash` gives it; empty where it was not known.
+    n_splats : int
+    layout : str, optional
+        Layout chosen by hand.
+    """
+
+    path: str
+    content_hash: str
+    n_splats: int
+    layout: str | None = None
+
+
+@dataclass(frozen=True)
+class HandleSettings:
+    """What a handle has besides its recipe."""
+
+    handle_id: int
+    color: str
+    enabled: bool = True
+
+
+@dataclass(frozen=True)
+class KeySpec:
+    """Poses of handles, by id, at a frame."""
+
+    frame: int
+    poses: Mapping[int, PoseSpec]
+
+
+@dataclass(frozen=True)
+class TimelineSpec:
+    """Keyframes: the fields of `splap_editor.session.timeline.Timeline`."""
+
+    keys: tuple[KeySpec, ...] = ()
+    frame: int = 1
+    n_frames: int = 72
+    fps: float = 24.0
+    is_smooth: bool = True
+    is_auto: bool = True
+
+
+@dataclass(frozen=True)
+class ViewSpec:
+    """Where the camera stands: the fields of `splap_editor.viewport.camera.View`, and its turntable."""
+
+    position: Vector
+    focal_point: Vector
+    view_up: Vector
+    angle: float = 35.0
+    is_parallel: bool = False
+    is_turntable: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class SessionFile:
+    """Everything a session file holds.
+
+    Parameters
+    ----------
+    ply : PlySpec
+    recipe : Recipe
+        With the disabled handles too.
+    handles : tuple of HandleSettings
+        In the order of the recipe's handles.
+    active_handles : tuple of int
+        Ids of the chosen handles.
+    timeline : TimelineSpec
+    view : ViewSpec, optional
+    display : mapping
+        Display options by name. Which there are is up to the window: unknown ones are carried along.
+    selection, hidden : (N,) bool, optional
+        None for none.
+    selection_sets : mapping of name to (N,) bool
+    document : str, optional
+        Of a recovery file: absolute path of the session file that it continues; empty where there is none.
+    """
+
+    ply: PlySpec
+    recipe: Recipe = field(default_factory=Recipe)
+    handles: tuple[HandleSettings, ...] = ()
+    active_handles: tuple[int, ...] = ()
+    timeline: TimelineSpec = field(default_factory=TimelineSpec)
+    view: ViewSpec | None = None
+    display: Mapping[str, Scalar] = field(default_factory=dict)
+    selection: NDArray[np.bool_] | None = None
+    hidden: NDArray[np.bool_] | None = None
+    selection_sets: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+    document: str | None = None

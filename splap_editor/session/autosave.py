@@ -1,0 +1,128 @@
+"""Autosave: the edit in the user's state folder, a few seconds behind what is on screen."""
+
+import threading
+from dataclasses import replace
+from pathlib import Path
+from time import monotonic
+
+from splap_editor.io.session_file import write_session_file
+from splap_editor.session.documents import Documents
+from splap_editor.session.jobs import Post
+from splap_editor.session.recovery import Orphan, RecoverySlot, new_slot, orphans, recovery_folder
+from splap_editor.session.saved_state import SavedState
+from splap_editor.session.signals import Signal
+
+DELAY_S = 3.0
+
+
+class Autosave:
+    """Keeps the newest state that is in no session file in one recovery file, and none when all is saved.
+
+    The file is written on a thread of its own, whole or not at all. A process
+    that ends by `close` removes it; one that dies leaves it for the next
+    start, which finds it by `orphans`.
+
+    Parameters
+    ----------
+    documents : Documents
+    post : callable
+        Runs a callable on the main thread, soon.
+    folder : Path, optional
+        `recovery_folder` by default.
+    delay_s : float
+        The file is at most this much, and one write, behind.
+    """
+
+    def __init__(
+        self, documents: Documents, post: Post, *, folder: Path | None = None, delay_s: float = DELAY_S
+    ) -> None:
+        self.written = Signal()
+        self.failed = Signal()
+        self._documents = documents
+        self._post = post
+        self._folder = folder or recovery_folder()
+        self._delay_s = delay_s
+        self._slot: RecoverySlot | None = None
+        self._adopted: RecoverySlot | None = None
+        self._wanted: SavedState | None = None
+        self._document: Path | None = None
+        self._due: float | None = None
+        self._is_closing = False
+        self._has_failed = False
+        self._wake = threading.Condition()
+        self._thread = threading.Thread(target=self._run, name="splap-autosave", daemon=True)
+        self._thread.start()
+        documents.changed.connect(self._on_changed)
+
+    def orphans(self) -> list[Orphan]:
+        """Edits that other processes left behind when they died, the newest first."""
+        return orphans(self._folder)
+
+    def restore(self, orphan: Orphan, *, ply: Path | None = None) -> None:
+        """Bring an edit back; its file becomes the recovery file of this process once it is on screen."""
+        self._documents.recover(orphan.session, lambda: self._adopt(orphan.slot), ply=ply)
+
+    def close(self) -> None:
+        """End cleanly: nothing is left to recover."""
+        self._documents.changed.disconnect(self._on_changed)
+        with self._wake:
+            self._is_closing = True
+            self._wake.notify()
+        self._thread.join()
+        for slot in (self._slot, self._adopted):
+            if slot is not None:
+                slot.remove()
+        self._slot = self._adopted = None
+
+    def _adopt(self, slot: RecoverySlot) -> None:
+        with self._wake:
+            self._adopted = slot
+
+    def _on_changed(self) -> None:
+        documents = self._documents
+        state = documents.state() if documents.is_dirty else None
+        now = monotonic()
+        with self._wake:
+            is_waiting = self._due is not None and self._wanted is not None
+            self._wanted, self._document = state, documents.path
+            # A person who never stops is saved all the same: the delay counts from the first change.
+            if not (is_waiting and state is not None):
+                self._due = now if state is None else now + self._delay_s
+            self._wake.notify()
+
+    def _run(self) -> None:
+        while True:
+            with self._wake:
+                while not self._is_closing and (self._due is None or self._due > monotonic()):
+                    self._wake.wait(None if self._due is None else max(self._due - monotonic(), 0.0))
+                if self._is_closing:
+                    return
+                state, document, self._due = self._wanted, self._document, None
+                adopted, self._adopted = self._adopted, None
+            try:
+                self._keep(state, document, adopted)
+            except (OSError, ValueError) as error:
+                self._tell_failure(error)
+            else:
+                self._has_failed = False
+                self._post(lambda state=state: self.written.emit(state))
+
+    def _keep(self, state: SavedState | None, document: Path | None, adopted: RecoverySlot | None) -> None:
+        if adopted is not None:
+            own, self._slot = self._slot, adopted
+            if own is not None:
+                own.remove()
+        if state is None:
+            if self._slot is not None:
+                self._slot.clear()
+            return
+        if self._slot is None:
+            self._slot = new_slot(self._folder)
+        file = self._documents.file_of(state, None)
+        write_session_file(self._slot.path, replace(file, document=str(document.absolute()) if document else ""))
+
+    def _tell_failure(self, error: Exception) -> None:
+        """Say once that nothing is kept; it is tried again at the next change."""
+        if not self._has_failed:
+            self._has_failed = True
+            self._post(lambda: self.failed.emit(error))

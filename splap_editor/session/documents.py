@@ -1,0 +1,216 @@
+"""The session file behind the open scene: opened, saved, and compared with what is on screen."""
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from splap_editor.io.session_file import content_hash, read_session_file, write_session_file
+from splap_editor.io.session_specs import SessionFile
+from splap_editor.session.jobs import Job, Post, Worker
+from splap_editor.session.saved_state import Look, SavedState, restore_scene, saved_state, session_file_of
+from splap_editor.session.scene import Scene
+from splap_editor.session.session import Session
+from splap_editor.session.signals import Signal
+
+
+class MissingPlyError(ValueError):
+    """The PLY that a session belongs to is not where the session says.
+
+    Parameters
+    ----------
+    document : Path or None
+        The session file; None for a recovery file.
+    session : SessionFile
+    """
+
+    def __init__(self, document: Path | None, session: SessionFile) -> None:
+        name = Path(session.ply.path).name
+        where = document.name if document is not None else "the recovered edit"
+        super().__init__(f"{name} is not where {where} says ({session.ply.path}); find it, or put it back")
+        self.document = document
+        self.session = session
+
+
+@dataclass(eq=False)
+class _Arrival:
+    """A session on its way in: what to put into the scene, and what to say about it."""
+
+    session: SessionFile
+    document: Path | None
+    is_recovery: bool
+    notes: list[str]
+    arrived: Callable[[], None]
+    scene: Scene | None = None
+
+
+@dataclass(eq=False)
+class _Source:
+    """The PLY of the open scene and, once it is known, the hash of its bytes."""
+
+    path: Path
+    digest: str = ""
+
+
+class Documents:
+    """Opens and saves session files, and knows whether anything would be lost.
+
+    Reading, hashing and writing happen on a worker of its own, so that a
+    save never waits behind a scene that is being prepared.
+
+    Parameters
+    ----------
+    session : Session
+    post : callable
+        Runs a callable on the main thread, soon.
+    """
+
+    def __init__(self, session: Session, post: Post) -> None:
+        self.path: Path | None = None
+        self.look: Callable[[], Look] = Look
+        self.worker = Worker(post, name="splap-files")
+        self.changed = Signal()
+        self.saved = Signal()
+        self.opened = Signal()
+        self.failed = Signal()
+        self._session = session
+        self._arrival: _Arrival | None = None
+        self._source = _Source(Path())
+        self._kept: SavedState | None = None
+        session.scene_changed.connect(self._on_scene_changed)
+
+    def close(self) -> None:
+        """Finish writing and join the worker."""
+        self.worker.close()
+
+    # ---------------------------------------------------------------- state
+
+    def state(self) -> SavedState | None:
+        """All that a session file would keep of the scene as it is; None without a scene."""
+        return saved_state(self._session.scene, self.look()) if self._session.scene is not None else None
+
+    @property
+    def is_dirty(self) -> bool:
+        """Whether the scene holds something that no session file has."""
+        if self._session.scene is None:
+            return False
+        return self._kept is None or not self._kept.keeps_like(self.state())
+
+    @property
+    def would_lose(self) -> bool:
+        """Whether leaving the scene now would lose work: an edit neither saved nor exported, or keys not saved."""
+        return self.is_dirty and (self._session.has_unexported_edit or bool(self._session.scene.edit.timeline.keys))
+
+    def file_of(self, state: SavedState, folder: Path | None) -> SessionFile:
+        """Session file of a state, with the hash of the PLY as far as it is known."""
+        return session_file_of(state, folder, self._source.digest if self._source.path == state.source else "")
+
+    # ---------------------------------------------------------------- open
+
+    def open(self, path: Path, *, ply: Path | None = None) -> None:
+        """Open a session file and the PLY it belongs to, or another one given in its place."""
+
+        def read(job: Job) -> _Arrival:
+            session = read_session_file(path)
+            return _Arrival(session, path, False, [], lambda: None)
+
+        self._open(f"Opening {path.name}", read, path.parent, ply)
+
+    def recover(
+        self, session: SessionFile, arrived: Callable[[], None] = lambda: None, *, ply: Path | None = None
+    ) -> None:
+        """Open the edit of a recovery file; it counts as not saved. ``arrived`` is called once it is on screen."""
+        document = Path(session.document) if session.document else None
+        self._open(
+            "Restoring the edit",
+            lambda job: _Arrival(session, document, True, [], arrived),
+            document.parent if document is not None else Path(),
+            ply,
+        )
+
+    def _open(self, title: str, read: Callable[[Job], _Arrival], folder: Path, ply: Path | None) -> None:
+        def located(job: Job) -> tuple[_Arrival, Path]:
+            arrival = read(job)
+            return arrival, _located(arrival, folder, ply)
+
+        def done(found: tuple[_Arrival, Path]) -> None:
+            arrival, source = found
+
+            def restore(scene: Scene) -> None:
+                restore_scene(scene, arrival.session)
+                arrival.scene = scene
+
+            self._arrival = arrival
+            self._session.open(source, layout=arrival.session.ply.layout, restore=restore)
+
+        job = Job("open", title, located, done, failed=lambda error: self.failed.emit(title, error))
+        self.worker.submit(job, cancels=("open",))
+
+    def _on_scene_changed(self) -> None:
+        scene = self._session.scene
+        arrival, self._arrival = self._arrival, None
+        self._source = source = _Source(scene.file.path)
+        self.worker.submit(Job("hash", "", lambda job: _take_digest(source)), cancels=("hash",))
+        scene.edit_changed.connect(self.changed.emit)
+        scene.hidden_changed.connect(self.changed.emit)
+        scene.selection_changed.connect(self.changed.emit)
+        scene.selection_sets_changed.connect(self.changed.emit)
+        if arrival is None or arrival.scene is not scene:
+            self.path = None
+            self._kept = self.state()
+        else:
+            self.path = arrival.document
+            self._kept = None if arrival.is_recovery else self.state()
+            arrival.arrived()
+            self.opened.emit(arrival.session, arrival.notes)
+        self.changed.emit()
+
+    # ---------------------------------------------------------------- save
+
+    def save(self, path: Path | None = None) -> None:
+        """Save to the session file, or to another that takes its place.
+
+        Raises
+        ------
+        ValueError
+            There is no session file yet and none is given.
+        """
+        path = path or self.path
+        if path is None:
+            raise ValueError("the scene has no session file yet: give one")
+        state, scene, source = self.state(), self._session.scene, self._source
+
+        def write(job: Job) -> None:
+            _take_digest(source)
+            write_session_file(path, session_file_of(state, path.parent, source.digest))
+
+        def done(_: None) -> None:
+            if self._session.scene is scene:
+                self.path, self._kept = path, state
+            self.saved.emit(path)
+            self.changed.emit()
+
+        title = f"Saving {path.name}"
+        self.worker.submit(Job("save", title, write, done, lambda error: self.failed.emit(title, error)))
+
+
+def _take_digest(source: _Source) -> None:
+    """Hash the PLY unless that is done; a file that is gone by now has none."""
+    if not source.digest:
+        try:
+            source.digest = content_hash(source.path)
+        except OSError:
+            source.digest = ""
+
+
+def _located(arrival: _Arrival, folder: Path, ply: Path | None) -> Path:
+    """Find the PLY: where it is said to be, by its old place seen from the session file, or beside that."""
+    spec = arrival.session.ply
+    named = Path(spec.path)
+    places = [ply] if ply is not None else [folder / named, folder / named.name]
+    source = next((place for place in places if place.is_file()), None)
+    if source is None:
+        raise MissingPlyError(arrival.document, arrival.session)
+    if spec.content_hash and content_hash(source) != spec.content_hash:
+        arrival.notes.append(f"{source.name} has changed since this was saved; the edit may not fit it any more.")
+    return Path(os.path.abspath(source))

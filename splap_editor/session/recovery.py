@@ -1,0 +1,111 @@
+"""Recovery files: where the edit of each running process is kept, and those that dead processes left behind."""
+
+import contextlib
+import os
+import secrets
+from dataclasses import dataclass
+from pathlib import Path
+
+import platformdirs
+
+from splap_editor.io.file_lock import FileLock
+from splap_editor.io.session_file import SUFFIX, SessionFileError, read_session_file
+from splap_editor.io.session_specs import SessionFile
+
+
+def recovery_folder() -> Path:
+    """Folder in the user's state folder, or in ``SPLAP_STATE_DIR``."""
+    named = os.environ.get("SPLAP_STATE_DIR")
+    return (Path(named) if named else Path(platformdirs.user_state_dir("splap-editor"))) / "recovery"
+
+
+@dataclass(frozen=True, eq=False)
+class RecoverySlot:
+    """A recovery file and the lock that says that a process is alive behind it."""
+
+    path: Path
+    lock: FileLock
+
+    def remove(self) -> None:
+        """Delete both."""
+        self.clear()
+        self.lock.remove()
+
+    def clear(self) -> None:
+        """Delete the recovery file and what a write cut short may have left beside it."""
+        for path in (self.path, *self.path.parent.glob(f".{self.path.name}.*.part")):
+            path.unlink(missing_ok=True)
+
+
+def new_slot(folder: Path) -> RecoverySlot:
+    """Take a recovery file for this process; it is not written yet.
+
+    Raises
+    ------
+    OSError
+        If the folder cannot be made or written to.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    while True:
+        path = folder / f"{os.getpid()}-{secrets.token_hex(4)}{SUFFIX}"
+        with contextlib.suppress(BlockingIOError):
+            return RecoverySlot(path, FileLock(_lock_path(path)))
+
+
+@dataclass(frozen=True, eq=False)
+class Orphan:
+    """An edit that a process which is gone left behind; held until it is restored, discarded or released.
+
+    Parameters
+    ----------
+    slot : RecoverySlot
+    session : SessionFile
+        What the file holds.
+    saved_at : float
+        When, in seconds since 1970.
+    """
+
+    slot: RecoverySlot
+    session: SessionFile
+    saved_at: float
+
+    def release(self) -> None:
+        """Leave it for the next start."""
+        self.slot.lock.release()
+
+
+def orphans(folder: Path) -> list[Orphan]:
+    """Find the edits that dead processes left in a folder, the newest first.
+
+    Files of living processes are left alone, and so are those that cannot be
+    read; locks and half-written files without an edit are cleared away.
+    """
+    found = []
+    for path in sorted(folder.glob(f"*{SUFFIX}")):
+        orphan = _orphan(path)
+        if orphan is not None:
+            found.append(orphan)
+    for path in folder.glob("*.lock"):
+        with contextlib.suppress(OSError):
+            slot = RecoverySlot(path.with_suffix(SUFFIX), FileLock(path))
+            if slot.path.exists():
+                slot.lock.release()
+            else:
+                slot.remove()
+    return sorted(found, key=lambda orphan: -orphan.saved_at)
+
+
+def _orphan(path: Path) -> Orphan | None:
+    try:
+        lock = FileLock(_lock_path(path))
+    except OSError:
+        return None
+    try:
+        return Orphan(RecoverySlot(path, lock), read_session_file(path), path.stat().st_mtime)
+    except (OSError, SessionFileError):
+        lock.release()
+        return None
+
+
+def _lock_path(path: Path) -> Path:
+    return path.with_suffix(".lock")

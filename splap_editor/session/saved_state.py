@@ -1,0 +1,153 @@
+"""A scene and its edit as a session file says them, each made from the other."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from splap_editor.io.session_file import SessionFileError, relative_path
+from splap_editor.io.session_specs import (
+    HandleSettings,
+    KeySpec,
+    PlySpec,
+    PoseSpec,
+    Scalar,
+    SessionFile,
+    TimelineSpec,
+    ViewSpec,
+)
+from splap_editor.session.edit import Edit
+from splap_editor.session.pose import Pose
+from splap_editor.session.recipe_edit import edit_of, recipe_of
+from splap_editor.session.scene import Scene
+from splap_editor.session.timeline import Key, Timeline
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """Camera and display options, which belong to the window."""
+
+    view: ViewSpec | None = None
+    display: Mapping[str, Scalar] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class SavedState:
+    """All of a scene that a session file keeps, as references to values that never change.
+
+    Made in no time on the main thread; what becomes of it may be done on any other.
+    """
+
+    source: Path
+    layout: str | None
+    n_splats: int
+    edit: Edit
+    active_handles: tuple[int, ...]
+    selection: NDArray[np.bool_]
+    hidden: NDArray[np.bool_]
+    selection_sets: Mapping[str, NDArray[np.bool_]]
+    look: Look
+
+    def keeps_like(self, other: "SavedState") -> bool:
+        """Whether nothing is in one that a person would miss in the other; camera and selection are not missed."""
+        return (
+            self.edit is other.edit
+            and np.array_equal(self.hidden, other.hidden)
+            and list(self.selection_sets) == list(other.selection_sets)
+            and all(np.array_equal(mask, other.selection_sets[name]) for name, mask in self.selection_sets.items())
+        )
+
+
+def saved_state(scene: Scene, look: Look) -> SavedState:
+    """Take the state of a scene as it is."""
+    layout = scene.file.layout
+    return SavedState(
+        scene.file.path,
+        layout.name if layout.is_chosen else None,
+        scene.splats.n_splats,
+        scene.edit,
+        scene.active_handles,
+        scene.selection,
+        scene.hidden,
+        scene.selection_sets,
+        look,
+    )
+
+
+def session_file_of(state: SavedState, folder: Path | None, content_hash: str) -> SessionFile:
+    """Write a state as a session file in a folder; the way to the PLY is absolute without one."""
+    source = state.source.absolute().as_posix() if folder is None else relative_path(state.source, folder)
+    edit = state.edit
+    return SessionFile(
+        PlySpec(source, content_hash, state.n_splats, state.layout),
+        recipe_of(edit, with_disabled=True),
+        tuple(HandleSettings(h.handle_id, h.color, h.enabled) for h in edit.handles),
+        state.active_handles,
+        _timeline_spec(edit.timeline),
+        state.look.view,
+        state.look.display,
+        state.selection if state.selection.any() else None,
+        state.hidden if state.hidden.any() else None,
+        state.selection_sets,
+    )
+
+
+def session_edit(session: SessionFile, splats) -> Edit:
+    """Make the edit of a session file.
+
+    Parameters
+    ----------
+    session : SessionFile
+    splats : Splats
+        Of the PLY it belongs to.
+
+    Raises
+    ------
+    RecipeError
+        A row is not in the PLY.
+    """
+    edit = edit_of(session.recipe, splats)
+    handles = tuple(
+        replace(handle, handle_id=settings.handle_id, color=settings.color, enabled=settings.enabled)
+        for handle, settings in zip(edit.handles, session.handles, strict=True)
+    )
+    return replace(edit, handles=handles, timeline=_timeline(session.timeline))
+
+
+def restore_scene(scene: Scene, session: SessionFile) -> None:
+    """Put what a session file holds into a scene just read, before anyone follows it.
+
+    Raises
+    ------
+    SessionFileError
+        The session belongs to another PLY: it names rows that this one does not have.
+    """
+    try:
+        scene.edit = session_edit(session, scene.splats)
+    except ValueError as error:
+        raise SessionFileError(f"the session does not fit {scene.file.path.name}: {error}") from None
+    known = {handle.handle_id for handle in scene.edit.handles}
+    scene.active_handles = tuple(handle_id for handle_id in session.active_handles if handle_id in known)
+    if session.ply.n_splats == scene.splats.n_splats:
+        for name in ("selection", "hidden"):
+            if getattr(session, name) is not None:
+                setattr(scene, name, getattr(session, name))
+        scene.selection_sets = dict(session.selection_sets)
+
+
+def _timeline_spec(timeline: Timeline) -> TimelineSpec:
+    keys = tuple(
+        KeySpec(key.frame, {h: PoseSpec(pose.translate, pose.rotate, pose.scale) for h, pose in key.poses.items()})
+        for key in timeline.keys
+    )
+    return TimelineSpec(keys, timeline.frame, timeline.n_frames, timeline.fps, timeline.is_smooth, timeline.is_auto)
+
+
+def _timeline(spec: TimelineSpec) -> Timeline:
+    keys = tuple(
+        Key(key.frame, {h: Pose(pose.translate, pose.rotate, pose.scale) for h, pose in key.poses.items()})
+        for key in spec.keys
+    )
+    return Timeline(keys, spec.frame, spec.n_frames, spec.fps, spec.is_smooth, spec.is_auto)
