@@ -1,10 +1,12 @@
 """Bounded biharmonic weights for the session: handles side by side, weights kept between runs."""
 
 import time
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, wait
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from splap_editor.core.bbw import BbwDeformer, BbwReport, bbw_weights
 from splap_editor.core.bbw_weights import BbwOptions, bbw_problem, handle_weight
@@ -18,11 +20,20 @@ WEIGHTS_VERSION = 1
 """Raised whenever the solver gives other weights than before."""
 
 N_THREADS = 4
-"""Handles solved at a time; factorisation and compiled loops let go of Python's lock."""
+"""Handles solved at a time unless told otherwise; factorisation and compiled loops let go of Python's lock."""
+
+StageProgress = Callable[[str], Progress]
 
 
 def bbw_deformer(
-    surface, handles: Handles, *, blending: str, cache: StageCache | None, progress: Progress
+    surface,
+    handles: Handles,
+    *,
+    blending: str,
+    cache: StageCache | None,
+    progress: Progress,
+    stages: StageProgress | None = None,
+    n_threads: int = N_THREADS,
 ) -> BbwDeformer:
     """Bind bounded biharmonic weights, from the cache where this handle set was solved before.
 
@@ -35,6 +46,10 @@ def bbw_deformer(
     cache : StageCache, optional
     progress : callable
         Told the mean share of the handles; may cancel.
+    stages : callable, optional
+        ``stages(words)`` gives the progress callback to tell instead, the words saying how far which handle is.
+    n_threads : int
+        Handles solved at a time; the weights do not depend on it.
     """
     options = BbwOptions(blending=blending)
     rest = surface.ellipses.centers
@@ -43,7 +58,7 @@ def bbw_deformer(
     )
     kept = cache.load(key) if cache is not None else None
     if kept is None:
-        weights, report = _solved(surface, handles, options, progress)
+        weights, report = _solved(surface, handles, options, progress, stages, n_threads)
         if cache is not None:
             cache.store(key, _packed(weights, report))
     else:
@@ -51,7 +66,7 @@ def bbw_deformer(
     return BbwDeformer.from_weights(rest, handles, weights, options=options, report=report)
 
 
-def _solved(surface, handles, options, progress):
+def _solved(surface, handles, options, progress, stages, n_threads):
     began = time.perf_counter()
     problem = bbw_problem(
         surface.ellipses.centers, surface.L, surface.M, handles, options=options, progress=part_of(progress, 0.0, 0.1)
@@ -68,15 +83,22 @@ def _solved(surface, handles, options, progress):
 
         return told
 
-    with ThreadPoolExecutor(N_THREADS, thread_name_prefix="splap-bbw") as threads:
+    with ThreadPoolExecutor(n_threads, thread_name_prefix="splap-bbw") as threads:
         futures = [threads.submit(handle_weight, problem, h, of_handle(h)) for h in range(handles.n_handles)]
         try:
             while wait(futures, timeout=REPORT_SECONDS).not_done:
-                progress(0.1 + 0.9 * float(shares.mean()))
+                told = progress if stages is None else stages(_words(shares, [future.done() for future in futures]))
+                told(0.1 + 0.9 * float(shares.mean()))
         except Cancelled:
             is_cancelled = True
             raise
     return bbw_weights(problem, [future.result() for future in futures], surface.graph, shared_seconds=shared)
+
+
+def _words(shares: NDArray[np.float64], done: list[bool]) -> str:
+    """Say how far the first unfinished handle is."""
+    handle = done.index(False) if False in done else len(done) - 1
+    return f"weights: handle {handle + 1} of {len(done)}, {100 * shares[handle]:.0f} %"
 
 
 def _packed(weights: sp.csr_array, report: BbwReport) -> Arrays:

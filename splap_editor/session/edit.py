@@ -135,17 +135,20 @@ class Edit:
 
 
 def binds_like(a: Edit, b: Edit) -> bool:
-    """Whether a deformer bound for one edit serves the other: same regions, pins and options, any pose."""
-    if (a.method, a.solver, a.blending, a.graph) != (b.method, b.solver, b.blending, b.graph):
+    """Whether a deformer bound for one edit serves the other: same regions, pins and options it uses, any pose."""
+    if (a.method, a.graph) != (b.method, b.graph) or len(a.pins) != len(b.pins):
         return False
-    if not _same_number(a.free_radius, b.free_radius) or len(a.pins) != len(b.pins):
+    has_cages = a.method == "bbw"
+    if has_cages and a.blending != b.blending:
+        return False
+    if not has_cages and (a.solver != b.solver or not _same_number(a.free_radius, b.free_radius)):
         return False
     left, right = a.active_handles, b.active_handles
     return (
         len(left) == len(right)
         and all(x is y for x, y in zip(a.pins, b.pins, strict=True))
         and all(
-            x.region is y.region and _same_number(x.cage_radius, y.cage_radius)
+            x.region is y.region and (not has_cages or _same_number(x.cage_radius, y.cage_radius))
             for x, y in zip(left, right, strict=True)
         )
     )

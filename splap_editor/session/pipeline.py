@@ -153,14 +153,33 @@ def handles_of(surface: Surface, edit: Edit) -> Handles:
 
 
 def deformer_of(
-    surface: Surface, edit: Edit, handles: Handles, *, cache: StageCache | None = None, progress: Progress
+    surface: Surface,
+    edit: Edit,
+    handles: Handles,
+    *,
+    cache: StageCache | None = None,
+    progress: Progress,
+    stages: StageProgress | None = None,
+    n_threads: int = 4,
 ) -> Deformer:
-    """Bind the deformer that an edit names; the one place where deformers are chosen."""
+    """Bind the deformer that an edit names; the one place where deformers are chosen.
+
+    ``stages`` is told, instead of ``progress``, where a deformer has more to say than a share; ``n_threads`` is for
+    those that have independent parts.
+    """
     if edit.method == "bbw":
         # The quadratic-program solvers are imported only by those who want them.
         from splap_editor.session.bbw_binding import bbw_deformer
 
-        return bbw_deformer(surface, handles, blending=edit.blending, cache=cache, progress=progress)
+        return bbw_deformer(
+            surface,
+            handles,
+            blending=edit.blending,
+            cache=cache,
+            progress=progress,
+            stages=stages,
+            n_threads=n_threads,
+        )
     return ArapDeformer(
         surface.ellipses.centers,
         surface.L,

@@ -64,6 +64,7 @@ class Session:
         self.worker.on_progress = lambda job: self.job_changed.emit(job)
         self.worker.on_busy = lambda job: self.job_changed.emit(job)
         self.cache = cache
+        self.n_threads = 4
         self.presenter: Presenter | None = None
         self.scene_changed = Signal()
         self.job_changed = Signal()
@@ -260,12 +261,12 @@ class Session:
     def _bind(self, scene: Scene, edit: Edit) -> None:
         if self._is_making("bind", lambda wanted: binds_like(wanted, edit)):
             return
-        surface, cache = scene.surface, self.cache
+        surface, cache, n = scene.surface, self.cache, self.n_threads
 
         def bind(job: Job) -> BoundEdit:
-            handles = handles_of(surface, edit)
-            progress = job.progress("binding")
-            return BoundEdit(edit, handles, deformer_of(surface, edit, handles, cache=cache, progress=progress))
+            handles, progress = handles_of(surface, edit), job.progress("binding")
+            made = deformer_of(surface, edit, handles, cache=cache, progress=progress, stages=job.progress, n_threads=n)
+            return BoundEdit(edit, handles, made)
 
         def done(bound: BoundEdit) -> None:
             if self.scene is scene and scene.surface is surface:

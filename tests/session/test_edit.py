@@ -1,9 +1,12 @@
 """Laws of poses and edits."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from splap_editor.core.handle_nodes import Region
 from splap_editor.core.rotations import quats_to_matrices
+from splap_editor.io.recipe import SolverSpec
 from splap_editor.session.edit import Edit, Handle, Pose, binds_like, poses_like
 
 
@@ -54,9 +57,22 @@ def test_a_pose_change_needs_no_new_binding():
 
 
 def test_a_disabled_handle_neither_binds_nor_poses():
-    from dataclasses import replace
-
     edit = Edit().with_handle(handle())
     both = edit.with_handle(replace(handle(2, pose=Pose((5.0, 0.0, 0.0))), enabled=False))
     assert binds_like(edit, both) and poses_like(edit, both)
     assert both.transforms.shape == (1, 4, 4)
+
+
+def test_only_what_the_method_uses_asks_for_a_new_binding():
+    arap = Edit().with_handle(handle())
+    bbw = replace(arap, method="bbw")
+    for field, value, needed_by in (
+        ("free_radius", 2.0, "arap"),
+        ("solver", SolverSpec(iterations=3), "arap"),
+        ("blending", "linear", "bbw"),
+    ):
+        assert binds_like(arap, replace(arap, **{field: value})) == (needed_by != "arap"), field
+        assert binds_like(bbw, replace(bbw, **{field: value})) == (needed_by != "bbw"), field
+    wider = replace(arap.handles[0], cage_radius=None)
+    assert binds_like(arap, arap.with_handle(wider))
+    assert not binds_like(bbw, bbw.with_handle(wider))
