@@ -1,0 +1,23 @@
+"""An event loop without a window."""
+
+import queue
+import time
+
+
+class MainThread:
+    """Runs what workers post, on the thread that calls `run_until`."""
+
+    def __init__(self):
+        self.calls = queue.Queue()
+
+    def post(self, call):
+        self.calls.put(call)
+
+    def run_until(self, condition, seconds=120.0):
+        end = time.monotonic() + seconds
+        while not condition():
+            try:
+                call = self.calls.get(timeout=max(end - time.monotonic(), 0.001))
+            except queue.Empty:
+                raise AssertionError("it did not happen in time") from None
+            call()

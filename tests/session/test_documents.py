@@ -1,0 +1,232 @@
+"""Session files as the window opens and saves them, without the window."""
+
+import json
+import os
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from splap_editor.core.handle_nodes import Region
+from splap_editor.io.session_file import SessionFileError, read_session_file
+from splap_editor.io.session_specs import ViewSpec
+from splap_editor.resources import resource
+from splap_editor.session.commands import ChangeSelectionSets
+from splap_editor.session.documents import Documents, MissingPlyError
+from splap_editor.session.edit import Pose
+from splap_editor.session.keyframes import edit_at_frame, keyed_edit
+from splap_editor.session.placement import rows_region
+from splap_editor.session.saved_state import Look
+from splap_editor.session.session import Session
+
+from .main_thread import MainThread
+
+LOOK = Look(ViewSpec((1.0, 2.0, 3.0), (0.0, 0.0, 0.1), (0.0, 0.0, 1.0)), {"mode": "points", "size_factor": 0.4})
+
+
+class Desk:
+    """A session and its documents with a capture in a folder of their own; nothing is computed."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        self.ply = folder / "captures" / "tube.ply"
+        self.ply.parent.mkdir(exist_ok=True)
+        shutil.copy(resource("samples", "tube.ply"), self.ply)
+        self.main = MainThread()
+        self.session = Session(self.main.post)
+        self.documents = Documents(self.session, self.main.post)
+        self.documents.look = lambda: LOOK
+        self.failures, self.opened, self.saved = [], [], []
+        self.session.scene_changed.connect(self.session.halt)
+        self.session.failed.connect(lambda title, error: self.failures.append(error))
+        self.documents.failed.connect(lambda title, error: self.failures.append(error))
+        self.documents.opened.connect(lambda session, notes: self.opened.append((session, notes)))
+        self.documents.saved.connect(self.saved.append)
+
+    @property
+    def scene(self):
+        return self.session.scene
+
+    def open_ply(self):
+        before = self.scene
+        self.session.open(self.ply)
+        self.main.run_until(lambda: self.scene is not before)
+
+    def open(self, path, **options):
+        n = len(self.opened) + len(self.failures)
+        self.documents.open(path, **options)
+        self.main.run_until(lambda: len(self.opened) + len(self.failures) > n)
+
+    def save(self, path=None):
+        n = len(self.saved) + len(self.failures)
+        self.documents.save(path)
+        self.main.run_until(lambda: len(self.saved) + len(self.failures) > n)
+
+    def edit(self):
+        """Two handles, one disabled and deleted ones before it, a pin, keys, a selection, hidden splats and a set."""
+        session, scene = self.session, self.scene
+        gone = session.add_handle(Region(np.array([9.0, 9.0, 9.0]), 1.0))
+        session.change_edit(scene.edit.without_handles([gone.handle_id]), "Delete handle")
+        session.add_handle(rows_region(scene, np.arange(50, 90)), pose=Pose((0.1, 1 / 3, 0.0), (0.8, 0.6, 0.0, 0.0)))
+        second = session.add_handle(Region(np.array([0.1, 0.2, 1 / 3]), 0.07), name="tip")
+        session.add_pin(Region(np.array([0.0, 0.0, -0.5]), 0.2))
+        session.change_edit(scene.edit.with_handle(replace(second, enabled=False, color="#123456")), "Change handle")
+        session.change_edit(keyed_edit(scene.edit), "Set key")
+        session.change_edit(edit_at_frame(scene.edit, 24), "Go to frame 24")
+        handle = scene.edit.handles[0]
+        session.change_edit(scene.edit.with_poses({handle.handle_id: Pose((0.0, 0.0, 0.2))}), "Move handle")
+        mask = np.zeros(scene.splats.n_splats, bool)
+        mask[3:30] = True
+        session.change_mask("selection", mask, "Select")
+        session.change_mask("hidden", ~mask, "Hide")
+        session.history.push(ChangeSelectionSets(scene, {"end": mask}, "Keep selection"))
+
+    def close(self):
+        self.documents.close()
+        self.session.close()
+
+
+@pytest.fixture
+def desk(tmp_path):
+    desk = Desk(tmp_path)
+    yield desk
+    desk.close()
+
+
+def assert_same_edit(a, b):
+    assert [(h.handle_id, h.name, h.color, h.pose, h.enabled) for h in a.handles] == [
+        (h.handle_id, h.name, h.color, h.pose, h.enabled) for h in b.handles
+    ]
+    regions = zip((*(h.region for h in a.handles), *a.pins), (*(h.region for h in b.handles), *b.pins), strict=True)
+    for left, right in regions:
+        np.testing.assert_array_equal(left.center, right.center)
+        np.testing.assert_array_equal(left.rows, right.rows)
+        assert left.rows is not None or left.radius == right.radius
+    assert (a.timeline, a.graph, a.solver, a.method) == (b.timeline, b.graph, b.solver, b.method)
+
+
+def test_a_saved_session_opens_as_it_was(desk, tmp_path):
+    desk.open_ply()
+    desk.edit()
+    before, path = desk.scene, tmp_path / "work.splap"
+    desk.save(path)
+    assert json.loads(path.read_text())["ply"]["path"] == "captures/tube.ply"
+    desk.open_ply()
+    assert desk.scene.edit.handles == () and desk.documents.path is None
+    desk.open(path)
+    assert desk.failures == [] and desk.scene is not before
+    (session, notes), scene = desk.opened[-1], desk.scene
+    assert notes == [] and (session.view, session.display) == (LOOK.view, LOOK.display)
+    assert_same_edit(scene.edit, before.edit)
+    for name in ("selection", "hidden"):
+        np.testing.assert_array_equal(getattr(scene, name), getattr(before, name))
+    np.testing.assert_array_equal(scene.selection_sets["end"], before.selection_sets["end"])
+    assert scene.active_handles == before.active_handles
+    assert desk.documents.path == path and not desk.documents.is_dirty
+    assert not desk.session.history.can_undo
+    data = path.read_bytes()
+    desk.save()
+    assert path.read_bytes() == data
+
+
+def test_an_edit_is_dirty_until_it_is_saved_and_clean_again_when_undone(desk, tmp_path):
+    desk.open_ply()
+    documents, session = desk.documents, desk.session
+    assert not documents.is_dirty
+    session.add_handle(Region(np.zeros(3), 0.1), pose=Pose((0.1, 0.0, 0.0)))
+    assert documents.is_dirty and documents.would_lose
+    desk.save(tmp_path / "a.splap")
+    assert not documents.is_dirty and not documents.would_lose
+    session.history.undo()
+    assert documents.is_dirty
+    session.history.redo()
+    assert not documents.is_dirty
+
+
+def test_saving_without_a_name_is_refused(desk):
+    desk.open_ply()
+    with pytest.raises(ValueError, match="no session file yet"):
+        desk.documents.save()
+
+
+def test_a_save_that_fails_is_said_and_leaves_the_edit_dirty(desk, tmp_path):
+    desk.open_ply()
+    desk.edit()
+    desk.save(tmp_path / "no" / "a.splap")
+    assert isinstance(desk.failures[0], SessionFileError)
+    assert desk.documents.is_dirty and desk.documents.path is None
+
+
+def test_a_missing_ply_is_said_and_can_be_located(desk, tmp_path):
+    desk.open_ply()
+    desk.edit()
+    edit, path = desk.scene.edit, tmp_path / "work.splap"
+    desk.save(path)
+    desk.open_ply()
+    moved = tmp_path / "elsewhere.ply"
+    desk.ply.rename(moved)
+    before = desk.scene
+    desk.open(path)
+    (error,) = desk.failures
+    assert isinstance(error, MissingPlyError) and error.document == path and "tube.ply" in str(error)
+    assert desk.scene is before
+    desk.open(path, ply=moved)
+    assert_same_edit(desk.scene.edit, edit)
+    assert desk.opened[-1][1] == []
+    desk.save()
+    assert read_session_file(path).ply.path == "elsewhere.ply"
+
+
+def test_session_and_ply_may_move_together(desk, tmp_path):
+    desk.open_ply()
+    desk.edit()
+    desk.save(tmp_path / "work.splap")
+    os.rename(desk.ply.parent, tmp_path / "moved")
+    (tmp_path / "work.splap").rename(tmp_path / "moved" / "work.splap")
+    desk.open(tmp_path / "moved" / "work.splap")
+    assert desk.failures == [] and desk.scene.file.path == tmp_path / "moved" / "tube.ply"
+
+
+def test_a_changed_ply_is_said_and_opens(desk, tmp_path):
+    desk.open_ply()
+    desk.edit()
+    desk.save(tmp_path / "work.splap")
+    data = bytearray(desk.ply.read_bytes())
+    data[-1] ^= 1
+    desk.ply.write_bytes(data)
+    desk.open(tmp_path / "work.splap")
+    assert desk.failures == []
+    (note,) = desk.opened[-1][1]
+    assert "has changed since" in note
+
+
+def test_a_ply_with_too_few_splats_is_refused_and_the_open_scene_stays(desk, tmp_path):
+    desk.open_ply()
+    desk.session.add_handle(rows_region(desk.scene, np.array([desk.scene.splats.n_splats - 1])))
+    desk.save(tmp_path / "work.splap")
+    held = json.loads((tmp_path / "work.splap").read_text())
+    held["recipe"]["handles"][0]["rows"] = [10**9]
+    (tmp_path / "work.splap").write_text(json.dumps(held))
+    before = desk.scene
+    desk.open(tmp_path / "work.splap")
+    assert "does not fit tube.ply" in str(desk.failures[0])
+    assert desk.scene is before
+
+
+def test_a_corrupt_session_is_refused_and_the_open_scene_stays(desk, tmp_path):
+    desk.open_ply()
+    before, path = desk.scene, tmp_path / "bad.splap"
+    path.write_bytes(b"{}")
+    desk.open(path)
+    assert str(desk.failures[0]) == "bad.splap: it is not a SpLap session."
+    assert desk.scene is before and desk.documents.path is None
+
+
+def test_kept_selections_are_undone(desk):
+    desk.open_ply()
+    mask = np.ones(desk.scene.splats.n_splats, bool)
+    desk.session.history.push(ChangeSelectionSets(desk.scene, {"all": mask}, "Keep selection"))
+    assert desk.documents.is_dirty
+    desk.session.history.undo()
+    assert desk.scene.selection_sets == {} and not desk.documents.is_dirty
