@@ -28,10 +28,23 @@ def test_a_pose_shown_is_not_changed_by_showing_it(qtbot):
     form.changed.connect(told.append)
     pose = Pose((0.123456789, 0.0, -3.0), quat_of_euler((12.3456, 0.0, 1.0)), 1.23456789)
     form.show_pose(pose, 1.0)
-    form.scale.setValue(2.0)
+    form.scales[0].setValue(2.0)
     assert told[0].translate == pose.translate, "digits that are not shown are kept"
     assert told[0].rotate == pose.rotate
     assert told[0].scale == 2.0
+
+
+def test_a_scale_along_the_axes_has_three_fields(qtbot):
+    form = PoseForm()
+    qtbot.addWidget(form)
+    told = []
+    form.changed.connect(told.append)
+    form.show_pose(Pose(), 1.0)
+    assert [field.isHidden() for field in form.scales] == [False, True, True]
+    form.show_pose(Pose(scale=(1.0, 2.0, 3.0)), 1.0)
+    assert not any(field.isHidden() for field in form.scales)
+    form.scales[1].setValue(2.5)
+    assert told[-1].scale == (1.0, 2.5, 3.0)
 
 
 def test_a_label_dragged_sideways_changes_its_number(qtbot):

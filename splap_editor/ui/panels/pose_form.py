@@ -38,7 +38,7 @@ def quat_of_euler(degrees: ArrayLike) -> tuple[float, float, float, float]:
 
 
 class PoseForm(QWidget):
-    """Edits one `Pose`.
+    """Edits one `Pose`. A uniform scale has one field, a scale along the axes three.
 
     `changed` gives a pose to make an undoable step of; `previewed` one that
     follows the pointer until `changed` or `cancelled` comes.
@@ -52,29 +52,26 @@ class PoseForm(QWidget):
         self._pose = Pose()
         self._euler = np.zeros(3)
         self._scrubbed: Pose | None = None
+        self._grips: dict[NumberField, ScrubLabel] = {}
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setHorizontalSpacing(STEP)
         grid.setVerticalSpacing(STEP)
         self.translate = [NumberField(-1e9, 1e9, decimals=4, step=0.01) for _ in range(3)]
         self.rotate = [NumberField(-360, 360, decimals=2, step=1, unit="°") for _ in range(3)]
-        self.scale = NumberField(0.01, 100, decimals=3, step=0.01)
+        self.scales = [NumberField(0.01, 100, decimals=3, step=0.01) for _ in range(3)]
         for axis, (name, color) in enumerate(zip("XYZ", AXIS_COLORS, strict=True)):
             head = QLabel(f'<span style="color:{color}">{name}</span>')
             grid.addWidget(head, 0, axis + 1)
             grid.setColumnStretch(axis + 1, 1)
             grid.addLayout(self._cell(self.translate[axis], color), 1, axis + 1)
             grid.addLayout(self._cell(self.rotate[axis], color), 2, axis + 1)
-        for row, (text, fields) in enumerate(
-            (("Move", self.translate), ("Rotate", self.rotate), ("Scale", [self.scale]))
-        ):
-            label = ScrubLabel(text, fields[0]) if len(fields) == 1 else QLabel(text)
+            grid.addLayout(self._cell(self.scales[axis], color), 3, axis + 1)
+        for row, text in enumerate(("Move", "Rotate", "Scale"), start=1):
+            label = QLabel(text)
             label.setProperty("tone", "quiet")
-            grid.addWidget(label, row + 1, 0)
-            if isinstance(label, ScrubLabel):
-                self._connect_scrub(label, fields[0])
-        grid.addWidget(self.scale, 3, 1)
-        for field in (*self.translate, *self.rotate, self.scale):
+            grid.addWidget(label, row, 0)
+        for field in (*self.translate, *self.rotate, *self.scales):
             field.committed.connect(lambda _: self.changed.emit(self._read()))
 
     def show_pose(self, pose: Pose, unit: float) -> None:
@@ -88,13 +85,18 @@ class PoseForm(QWidget):
             self.translate[axis].setSingleStep(step)
             self.translate[axis].show_value(pose.translate[axis])
             self.rotate[axis].show_value(self._euler[axis])
-        self.scale.show_value(pose.scale)
+        is_uniform = not isinstance(pose.scale, tuple)
+        for axis, value in enumerate([pose.scale] * 3 if is_uniform else pose.scale):
+            self.scales[axis].show_value(value)
+            self._grips[self.scales[axis]].setVisible(axis == 0 or not is_uniform)
+            self.scales[axis].setVisible(axis == 0 or not is_uniform)
 
     def _cell(self, field: NumberField, color: str) -> QHBoxLayout:
         grip = ScrubLabel("‖", field)
         grip.setFixedWidth(8)
         grip.setStyleSheet(f"color: {color};")
         self._connect_scrub(grip, field)
+        self._grips[field] = grip
         cell = QHBoxLayout()
         cell.setSpacing(0)
         cell.addWidget(grip)
@@ -122,11 +124,15 @@ class PoseForm(QWidget):
         if not np.array_equal(angles, shown):
             self._euler = np.where(angles == shown, self._euler, angles)
             rotate = quat_of_euler(self._euler)
-        translate = tuple(
-            held if field.value() == round(held, field.decimals()) else field.value()
-            for field, held in zip(self.translate, self._pose.translate, strict=True)
-        )
-        scale = self.scale.value()
-        if scale == round(self._pose.scale, self.scale.decimals()):
-            scale = self._pose.scale
+        translate = tuple(_typed(*pair) for pair in zip(self.translate, self._pose.translate, strict=True))
+        scale = self._pose.scale
+        if isinstance(scale, tuple):
+            scale = tuple(_typed(*pair) for pair in zip(self.scales, scale, strict=True))
+        else:
+            scale = _typed(self.scales[0], scale)
         return Pose(translate, rotate, scale)
+
+
+def _typed(field: NumberField, held: float) -> float:
+    """Value of a field, with the digits it does not show unless it was changed."""
+    return held if field.value() == round(held, field.decimals()) else field.value()
