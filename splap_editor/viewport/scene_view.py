@@ -20,6 +20,7 @@ from splap_editor.viewport.overlays import circle
 from splap_editor.viewport.projection import Projection
 from splap_editor.viewport.splat_actor import DisplayMode, SplatFlag
 from splap_editor.viewport.viewport import Viewport
+from splap_editor.viewport.weight_view import WeightView
 
 FIXED_TINT = (46, 49, 58, 150)
 HANDLE_SHARE = 165
@@ -85,6 +86,7 @@ class SceneView:
         self._scene: Scene | None = None
         self._shows_tints = True
         self._tinted_for: tuple[object, ...] = ()
+        self._paint: NDArray[np.uint8] | None = None
         self._wants_view = False
         self._view_job: Job | None = None
         self._seen = SeenFrom(np.zeros(3), np.array([0.0, 0.0, -1.0], np.float32), False)
@@ -92,6 +94,7 @@ class SceneView:
         session.presenter = lambda kernels: presented(self._scene, kernels, self._seen)
         session.scene_changed.connect(self._on_scene_changed)
         session.state_changed.connect(self._show_tints)
+        self.weights = WeightView(session, viewport, self.paint)
 
     def close(self) -> None:
         """Let go of session and viewport."""
@@ -107,6 +110,12 @@ class SceneView:
     @shows_tints.setter
     def shows_tints(self, on: bool) -> None:
         self._shows_tints = on
+        self._show_tints()
+
+    def paint(self, colors: NDArray[np.uint8] | None) -> None:
+        """Lay colours (N, 4) uint8, the fourth their share, over the splats in place of the tints; None: the tints."""
+        self._paint = colors
+        self._tinted_for = ("paint",)
         self._show_tints()
 
     def rows_of_handles(self, handle_ids: Iterable[int]) -> NDArray[np.int64]:
@@ -137,6 +146,7 @@ class SceneView:
     def _on_scene_changed(self) -> None:
         self._scene = scene = self._session.scene
         self._tinted_for = ()
+        self._paint = None
         self.viewport.gizmo.detach()
         scene.pose_changed.connect(self._show_pose)
         scene.selection_changed.connect(self._show_flags)
@@ -205,6 +215,11 @@ class SceneView:
         scene, bound = self._scene, self._session.bound
         if not self._is_shown:
             return
+        if self._paint is not None:
+            if self._tinted_for != ("painted",):
+                self._tinted_for = ("painted",)
+                self.viewport.splats.set_tints(self._paint)
+            return
         colors = tuple(handle.color for handle in scene.edit.active_handles)
         is_known = bound is not None and len(bound.edit.active_handles) == len(colors) > 0
         wanted = (bound, colors) if self._shows_tints and is_known else ()
@@ -263,5 +278,5 @@ def _rgb(color: str) -> tuple[int, int, int]:
 
 
 def suggested_up(splats: Splats) -> tuple[float, float, float]:
-    """Guess which way is up: -Y for captures posed by structure from motion, as three-scale files mostly are, else Z."""
+    """Guess which way is up: -Y for captures posed by structure from motion, as most of three scales are, else Z."""
     return (0.0, 0.0, 1.0) if splats.n_scales == 2 else (0.0, -1.0, 0.0)

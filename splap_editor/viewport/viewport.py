@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow
 
 from splap_editor.viewport.axes_triad import AxesTriad
+from splap_editor.viewport.cage_outline import CageOutline
 from splap_editor.viewport.camera import Camera, View, box_corners
 from splap_editor.viewport.gizmo import Gizmo
 from splap_editor.viewport.gizmo_actor import GizmoActor
@@ -34,7 +35,7 @@ class Viewport:
     pixels from the top left corner. Only for the thread of the window.
 
     Parts to work with: `splats` (what is shown and how), `camera`, `gizmo`,
-    `markers`, `rings`, `triad`. The camera and the gizmo are models that do
+    `markers`, `rings`, `cage`, `triad`. The camera and the gizmo are models that do
     not ask for frames: call `camera_moved` and `gizmo_changed` after them.
 
     Parameters
@@ -80,6 +81,7 @@ class Viewport:
         self.markers = Markers(self._overlay)
         self.markers.set_size(_MARKER_PX * scale)
         self.rings = Rings(self._overlay)
+        self.cage = CageOutline(self.rings)
         self.triad = AxesTriad(self._corner, scale)
         self.thinning = Thinning()
         self._motions = 0
@@ -243,6 +245,7 @@ class Viewport:
         self._overlay_camera(projection)
         self.markers.set_viewport_size(projection.width, projection.height)
         self._gizmo_actor.refresh(projection)
+        self.cage.refresh(projection)
         self.triad.refresh(projection)
         # Edges are smoothed in the picture at rest only: on a software renderer it costs half a frame.
         self._corner.SetUseFXAA(not self.is_moving and self.splats.mode is not DisplayMode.SPLATS)

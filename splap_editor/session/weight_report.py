@@ -1,0 +1,83 @@
+"""Bounded biharmonic weights as numbers per splat and in words."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from splap_editor.core.bbw import BbwDeformer, BbwReport
+from splap_editor.session.edit import Edit
+from splap_editor.session.pipeline import Surface
+from splap_editor.session.scene import Scene
+
+KKT_WARNING = 1e-3
+"""Steps of a weight left to go that a person would see."""
+
+
+def splat_weights(surface: Surface, deformer: BbwDeformer, column: int) -> NDArray[np.float64]:
+    """Weight of one handle at every splat of the file.
+
+    Parameters
+    ----------
+    surface : Surface
+    deformer : BbwDeformer
+    column : int
+        Handle, in the order in which they were bound.
+
+    Returns
+    -------
+    (N,) float64
+        In 0..1; inert splats have the mean of the nodes that carry them.
+    """
+    of_nodes = deformer.sparse_weights[:, [column]].toarray().ravel()
+    ellipses, binding = surface.ellipses, surface.binding
+    weights = np.zeros(ellipses.n_splats)
+    weights[ellipses.rows] = of_nodes
+    carried = np.sum(of_nodes[binding.inert_carriers] * binding.inert_weights, axis=1)
+    weights[np.flatnonzero(ellipses.node_of_row < 0)] = carried
+    return weights
+
+
+def cage_radius(scene: Scene, radius: float | None) -> float | None:
+    """Reach of a handle's weight in world units, the default filled in; None for the whole object."""
+    return 0.3 * scene.ellipses.scene_scale if radius is not None and np.isnan(radius) else radius
+
+
+def weight_lines(edit: Edit, report: BbwReport) -> list[tuple[str, str]]:
+    """Say how good the weights are, and what they do not reach.
+
+    Parameters
+    ----------
+    edit : Edit
+        The edit they were bound for.
+    report : BbwReport
+
+    Returns
+    -------
+    list of (str, str)
+        A sentence, and ``"quiet"`` or ``"warning"``.
+    """
+    lines = []
+    for index, (handle, qp) in enumerate(zip(edit.active_handles, report.handles, strict=True)):
+        if index in report.unreachable:
+            lines.append(
+                (
+                    f"{handle.name} moves only its own splats: no free splat that hangs together with it lies in its "
+                    "cage. Widen the cage, or join the pieces.",
+                    "warning",
+                )
+            )
+            continue
+        solver = "interior-point solver, the active set did not settle" if qp.fallback else "active set"
+        n = qp.n_factorisations
+        lines.append(
+            (
+                f"{handle.name}: {report.n_unknowns[index]:,} splats weighed, {n} factorisation{'s' if n != 1 else ''} "
+                f"({solver}); a weight is off by about {qp.kkt_residual:.0e} (KKT residual), "
+                f"{qp.bound_violation:.0e} past its bounds before it was set on them.",
+                "warning" if qp.fallback or qp.kkt_residual > KKT_WARNING else "quiet",
+            )
+        )
+    if report.n_specks:
+        lines.append((f"{report.n_specks:,} splats in loose specks follow their nearest neighbour.", "quiet"))
+    if report.n_resting:
+        lines.append((f"{report.n_resting:,} splats in pieces that no handle touches stay at rest.", "quiet"))
+    return lines

@@ -1,0 +1,125 @@
+"""Bounded biharmonic weights over the splats, and the cage that the chosen handle reaches in."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from splap_editor.core.handle_nodes import Region, handle_nodes
+from splap_editor.session.edit import Handle
+from splap_editor.session.scene import Scene
+from splap_editor.session.session import Session
+from splap_editor.session.signals import Signal
+from splap_editor.session.weight_report import cage_radius, splat_weights
+from splap_editor.viewport.viewport import Viewport
+from splap_editor.viewport.weight_colors import weight_tints
+
+Paint = Callable[[NDArray[np.uint8] | None], None]
+
+
+class WeightView:
+    """Follows the chosen handle.
+
+    `changed` tells when another handle's weights are shown, or none.
+
+    Parameters
+    ----------
+    session : Session
+    viewport : Viewport
+        Where the cage is outlined.
+    paint : callable
+        Lays colours (N, 4) over the splats, or takes them away (None).
+    """
+
+    def __init__(self, session: Session, viewport: Viewport, paint: Paint) -> None:
+        self.changed = Signal()
+        self.handle: Handle | None = None
+        self._session = session
+        self._viewport = viewport
+        self._paint = paint
+        self._is_on = False
+        self._painted: tuple[object, int] | None = None
+        self._nodes: tuple[Region | None, NDArray[np.float64]] = (None, np.empty((0, 3)))
+        session.scene_changed.connect(self._on_scene_changed)
+        session.state_changed.connect(self._show_weights)
+
+    @property
+    def is_on(self) -> bool:
+        """Whether weights are shown wherever there are some."""
+        return self._is_on
+
+    @is_on.setter
+    def is_on(self, on: bool) -> None:
+        self._is_on = on
+        self._show_weights()
+
+    def preview_cage(self, radius: float | None) -> None:
+        """Outline the chosen handle's cage at another radius than it has; None for the whole object."""
+        self._show_cage(radius)
+
+    def _on_scene_changed(self) -> None:
+        scene = self._session.scene
+        self._nodes = (None, np.empty((0, 3)))
+        self._painted = None
+        for signal in (scene.active_handles_changed, scene.edit_changed, scene.preview_changed):
+            signal.connect(self._show)
+        self._show()
+
+    def _show(self) -> None:
+        self._show_weights()
+        handle = self._chosen()
+        self._show_cage(handle.cage_radius if handle is not None else None)
+
+    def _chosen(self) -> Handle | None:
+        """The handle whose cage and weights are looked at: the one chosen last."""
+        scene = self._session.scene
+        if scene is None or scene.edit.method != "bbw":
+            return None
+        wanted = scene.active_handles
+        found = [handle for handle in scene.edit.active_handles if handle.handle_id in wanted]
+        return max(found, key=lambda handle: wanted.index(handle.handle_id), default=None)
+
+    # Weights ------------------------------------------------------------------------------------------------------
+
+    def _show_weights(self) -> None:
+        scene, bound = self._session.scene, self._session.bound
+        handle, column = None, -1
+        if self._is_on and scene is not None and scene.surface is not None and bound is not None:
+            shown = bound.edit.active_handles if bound.edit.method == scene.edit.method == "bbw" else ()
+            handle = self._chosen() or next(iter(shown), None)
+            ids = [each.handle_id for each in shown]
+            column = ids.index(handle.handle_id) if handle is not None and handle.handle_id in ids else -1
+        if column < 0:
+            self._take(None, None, None)
+        elif self._painted is None or self._painted[0] is not bound.deformer or self._painted[1] != column:
+            weights = splat_weights(scene.surface, bound.deformer, column)
+            self._take((bound.deformer, column), weight_tints(weights), handle)
+        else:
+            self._take(self._painted, None, handle)
+
+    def _take(self, painted: tuple[object, int] | None, tints: NDArray[np.uint8] | None, handle: Handle | None) -> None:
+        if tints is not None or (painted is None and self._painted is not None):
+            self._paint(tints)
+        self._painted = painted
+        if handle is not self.handle:
+            self.handle = handle
+            self.changed.emit()
+
+    # Cage ---------------------------------------------------------------------------------------------------------
+
+    def _show_cage(self, radius: float | None) -> None:
+        scene, handle = self._session.scene, self._chosen()
+        radius = cage_radius(scene, radius) if handle is not None else None
+        # A drag shows the deformed object; the cage is of the one at rest.
+        if radius is None or radius <= 0 or scene.preview is not None:
+            self._viewport.cage.hide()
+        else:
+            color = tuple(int(handle.color[k : k + 2], 16) / 255 for k in (1, 3, 5))
+            self._viewport.cage.show(self._nodes_of(scene, handle), radius, color)
+        self._viewport.request_render()
+
+    def _nodes_of(self, scene: Scene, handle: Handle) -> NDArray[np.float64]:
+        if self._nodes[0] is not handle.region:
+            nodes = handle_nodes(scene.ellipses, [handle.region]).indices
+            self._nodes = (handle.region, scene.ellipses.centers[nodes])
+        return self._nodes[1]
