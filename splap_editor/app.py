@@ -1,10 +1,13 @@
 """The composition root: every part of the window is made and wired here."""
 
+import os
 import sys
 import traceback
 from collections.abc import Callable
 from pathlib import Path
 from time import sleep
+
+os.environ.setdefault("QT_API", "pyside6")
 
 from PySide6.QtCore import QCoreApplication, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QSurfaceFormat
@@ -22,9 +25,8 @@ from splap_editor.tools.transform_tool import TransformTool
 from splap_editor.ui.display import Display
 from splap_editor.ui.file_commands import sample_path
 from splap_editor.ui.main_window import MainWindow
-from splap_editor.ui.render_widget import surface_format
 from splap_editor.ui.theme import apply_theme
-from splap_editor.ui.viewport_widget import ViewportWidget
+from splap_editor.ui.viewport_widget import ViewportWidget, surface_format
 from splap_editor.viewport.scene_view import SceneView
 from splap_editor.viewport.viewport import Viewport
 from splap_editor.warm_up import is_warm, load_view_loops, warm_up_elsewhere
@@ -76,7 +78,7 @@ def make_window(cache: StageCache | None = None) -> MainWindow:
     session = Session(mailbox.post, cache=cache or StageCache())
     widget = ViewportWidget()
     scale = widget.devicePixelRatioF()
-    viewport = Viewport(widget.render_window, widget.update, scale=scale)
+    viewport = Viewport(widget.render_window, widget.update, renderer=widget.renderer, scale=scale)
     view = SceneView(session, viewport)
     context = ToolContext(session, viewport)
     context.navigate = NavigateTool(context)

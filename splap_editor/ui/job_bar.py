@@ -17,7 +17,6 @@ STAGES = {
     "geodesics": "measuring along the surface",
     "laplacian": "weighing neighbours",
     "kernels": "attaching splats",
-    "coarse model": "sketching the shape for live drags",
     "binding": "getting ready to bend",
     "settling": "settling",
 }

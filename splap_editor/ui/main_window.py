@@ -351,7 +351,7 @@ class MainWindow(QMainWindow):
         self.tools.cancel()
         self.session.close()
         self.view.close()
-        self.viewport.release()
+        self.viewport.close()
         event.accept()
 
     def _close_for_good(self) -> None:

@@ -1,15 +1,19 @@
-"""The widget around the viewport: pointer and key events for the tools."""
+"""The Qt widget around the viewport: one VTK render per shown frame, pointer and key events for the tools."""
 
+import os
 import sys
 from collections.abc import Callable
 from math import log
+from time import perf_counter
+
+os.environ.setdefault("QT_API", "pyside6")
 
 from PySide6.QtCore import QEvent, Qt, Signal
-from PySide6.QtGui import QKeyEvent, QMouseEvent, QNativeGestureEvent, QWheelEvent
+from PySide6.QtGui import QKeyEvent, QMouseEvent, QNativeGestureEvent, QSurfaceFormat, QWheelEvent
 from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QLineEdit, QWidget
+from pyvistaqt import QtInteractor
 
 from splap_editor.tools.tool import KeyEvent, PointerEvent
-from splap_editor.ui.render_widget import RenderWidget
 
 BUTTONS = {
     Qt.MouseButton.LeftButton: "left",
@@ -24,33 +28,78 @@ PointerTaker = Callable[[PointerEvent], bool]
 KeyTaker = Callable[[KeyEvent], bool]
 
 
-class ViewportWidget(RenderWidget):
-    """Tells what pointer and keys do over the picture."""
+class ViewportWidget(QtInteractor):
+    """Shows a VTK render window and tells what pointer and keys do over it.
 
+    pyvistaqt renders twice for each frame shown and holds Python's lock
+    meanwhile. Here every render request only asks Qt for a paint; the paint
+    does the one render, by a call that lets other threads run. VTK's own
+    mouse and key bindings never see an event.
+    """
+
+    frame_drawn = Signal(float)
+    """A frame is on its way to the screen; the milliseconds its render took."""
     resized = Signal()
     compare_held = Signal(bool)
     menu_wanted = Signal(object)
     """A right click that no tool wanted; the global position."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+        self._is_ready = False
+        super().__init__(parent, auto_update=False, multi_samples=0)
         self._pointer_taker: PointerTaker = lambda event: False
         self._key_taker: KeyTaker = lambda event: False
         self._taken_key: int | None = None
         self._is_compare_held = False
+        self.n_renders = 0
+        interactor = self.iren.interactor
+        interactor.EnableRenderOff()
+        self._render_tag = interactor.AddObserver("RenderEvent", self._on_render_event)
+        self.reset_key_events()
+        interactor.RemoveObservers("CharEvent")
+        self.setAcceptDrops(False)
         self.setMinimumSize(320, 240)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setMouseTracking(True)
+        self._is_ready = True
 
     def connect_tools(self, pointer: PointerTaker, key: KeyTaker) -> None:
         """Say who takes pointer and key events; each returns True for an event it used."""
         self._pointer_taker = pointer
         self._key_taker = key
 
+    # ---------------------------------------------------------------- frames
+
+    def render(self, *_: object, **__: object) -> None:
+        """Ask for a frame; any number of requests give one."""
+        if self._is_ready:
+            self.update()
+
+    def paintGL(self) -> None:
+        """Draw one frame."""
+        start = perf_counter()
+        super().paintGL()
+        self.frame_drawn.emit(1000.0 * (perf_counter() - start))
+
     def resizeGL(self, width: int, height: int) -> None:
         """Follow the widget's size."""
         super().resizeGL(width, height)
         self.resized.emit()
+
+    def _on_render_event(self, *_: object) -> None:
+        if self._in_paint:
+            self.n_renders += 1
+            # vtkRenderWindow.Render lets other threads run; vtkRenderWindowInteractor.Render does not.
+            self._RenderWindow.Render()
+        else:
+            self.update()
+
+    def close(self) -> None:
+        """Free the GL objects; the widget shows nothing afterwards."""
+        if self._is_ready:
+            self._is_ready = False
+            self.iren.interactor.RemoveObserver(self._render_tag)
+        super().close()
 
     # ---------------------------------------------------------------- pointer
 
@@ -185,6 +234,19 @@ class ViewportWidget(RenderWidget):
                 pressed=pressed,
             ),
         )
+
+
+def surface_format() -> QSurfaceFormat:
+    """What the window asks of OpenGL; to be set before the application is made."""
+    wanted = QSurfaceFormat()
+    wanted.setRenderableType(QSurfaceFormat.RenderableType.OpenGL)
+    wanted.setProfile(QSurfaceFormat.OpenGLContextProfile.CoreProfile)
+    wanted.setVersion(3, 2)
+    wanted.setSwapBehavior(QSurfaceFormat.SwapBehavior.DoubleBuffer)
+    wanted.setAlphaBufferSize(8)
+    wanted.setDepthBufferSize(8)
+    wanted.setSamples(0)
+    return wanted
 
 
 def _key_name(event: QKeyEvent) -> str:

@@ -14,8 +14,8 @@ from PySide6.QtWidgets import QApplication
 from splap_editor.app import make_window
 from splap_editor.resources import resource
 from splap_editor.ui.main_window import MainWindow
-from splap_editor.ui.render_widget import surface_format
 from splap_editor.ui.theme import apply_theme
+from splap_editor.ui.viewport_widget import surface_format
 
 WAIT_MS = 60_000
 IDLE = ("ready", "settled")

@@ -22,7 +22,7 @@ def test_many_requests_before_a_paint_give_one_render(driver, qtbot):
     widget.n_renders = 0
     with qtbot.waitSignal(widget.frame_drawn):
         for _ in range(20):
-            widget.update()
+            widget.render()
             driver.window.view.viewport.request_render()
     assert widget.n_renders == 1
 
