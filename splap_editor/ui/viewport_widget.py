@@ -31,6 +31,8 @@ KeyTaker = Callable[[KeyEvent], bool]
 class ViewportWidget(QtInteractor):
     """Shows a VTK render window and tells what pointer and keys do over it.
 
+    Hosting VTK in Qt is left to pyvistaqt, which the project is bound to, rather than done here.
+
     pyvistaqt renders twice for each frame shown and holds Python's lock
     meanwhile. Here every render request only asks Qt for a paint; the paint
     does the one render, by a call that lets other threads run. VTK's own

@@ -29,7 +29,7 @@ from splap_editor.core.handle_nodes import Region
 from splap_editor.io.sample_maker import big_scene, write_sample
 from splap_editor.session.cache import StageCache
 from splap_editor.session.edit import Pose
-from splap_editor.ui.render_widget import surface_format
+from splap_editor.ui.viewport_widget import surface_format
 from splap_editor.ui.theme import apply_theme
 from tests.benchmark.peers import machine, note, report, timed
 
@@ -45,7 +45,7 @@ from PySide6.QtWidgets import QApplication
 from splap_editor.app import make_window
 from splap_editor.ui.file_commands import sample_path
 from splap_editor.ui.theme import apply_theme
-from splap_editor.ui.render_widget import surface_format
+from splap_editor.ui.viewport_widget import surface_format
 QSurfaceFormat.setDefaultFormat(surface_format())
 app = QApplication(sys.argv[:1])
 apply_theme(app)
