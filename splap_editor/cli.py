@@ -56,6 +56,7 @@ def _parser() -> argparse.ArgumentParser:
     deform.add_argument("--recipe", required=True, type=Path, metavar="EDIT.json", help="what to deform, and how")
     deform.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.ply")
     deform.add_argument("--as-3dgs", action="store_true", help="add a thin third scale to a file of two")
+    deform.add_argument("--columns", default="", metavar="NAMES", help="also write quantities: displacement,stretch")
     deform.add_argument("--no-cache", action="store_true", help="neither read nor keep graph and Laplacian")
     _add_output(deform)
     deform.set_defaults(run=_deform)
@@ -99,21 +100,23 @@ def _deform(options: argparse.Namespace) -> int:
     from splap_editor.session.cache import StageCache
     from splap_editor.session.export_report import export_report
     from splap_editor.session.pipeline import deformer_of, handles_of, kernels_of, surface_of
+    from splap_editor.session.quantities import Snapshot, columns_of
     from splap_editor.session.recipe_edit import edit_of
 
     report = StageReport(quiet=options.quiet or options.json)
+    columns = [name.strip() for name in options.columns.split(",") if name.strip()]
     recipe = read_recipe(options.recipe)
     with report("read"):
         file = read_ply(options.file, layout=options.layout, progress=report.progress)
     for warning in file.warnings:
         report.say(f"note: {warning}")
     edit = edit_of(recipe, file.splats)
-    kernels = None
-    deformation = None
-    if edit.active_handles:
+    kernels = handles = deformer = deformation = surface = None
+    if edit.active_handles or columns:
         cache = None if options.no_cache else StageCache()
         surface = surface_of(file.splats, edit.graph, cache=cache, stages=report.stage)
         report.end_stage()
+    if edit.active_handles:
         with report("bind"):
             handles = handles_of(surface, edit)
             deformer = deformer_of(surface, edit, handles, cache=cache, progress=report.progress)
@@ -124,7 +127,14 @@ def _deform(options: argparse.Namespace) -> int:
     with report("colour"):
         splats = file.splats if kernels is None else adapted_splats(file.splats, kernels)
     with report("write"):
-        write_ply(options.output, file, splats, as_3dgs=options.as_3dgs)
+        extra = {}
+        if columns:
+            weights = getattr(deformer, "weights", None)
+            handle = 0 if len(edit.active_handles) == 1 else None
+            extra = columns_of(
+                columns, Snapshot(file.splats, surface.ellipses, surface, kernels, handles, weights, handle)
+            )
+        write_ply(options.output, file, splats, as_3dgs=options.as_3dgs, extra=extra)
     summary = export_report(options.output, file.splats, kernels)
     if options.json:
         print(

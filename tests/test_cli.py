@@ -204,3 +204,18 @@ def test_help_and_info_pay_for_no_window_and_no_compiler(arguments):
         "assert not heavy, heavy\n"
     )
     subprocess.run([sys.executable, "-c", script, *arguments], check=True, capture_output=True, timeout=60)
+
+
+def test_quantities_are_written_as_columns_on_request(tmp_path, recipe, capsys):
+    out = tmp_path / "out.ply"
+    arguments = ["deform", str(TUBE), "--recipe", str(recipe), "-o", str(out), "--quiet"]
+    assert main([*arguments, "--columns", "displacement, stretch,degree"]) == 0
+    vertex = plyfile.PlyData.read(out)["vertex"].data
+    assert vertex.dtype.names[-3:] == ("displacement", "stretch", "degree")
+    moved = np.linalg.norm(np.asarray(read_ply(out).splats.means, float) - read_ply(TUBE).splats.means, axis=1)
+    # Both the positions and the column are single precision.
+    np.testing.assert_allclose(vertex["displacement"], moved, atol=1e-5)
+    assert (vertex["degree"] >= 1).all() and (vertex["stretch"] > 0.5).all()
+    assert main([*arguments, "--columns", "colour"]) == 2
+    assert "there is no quantity 'colour'" in capsys.readouterr().err
+    assert main([*arguments, "--columns", "geodesic"]) == 2

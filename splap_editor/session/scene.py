@@ -35,6 +35,7 @@ class Scene:
         self.hidden = np.zeros(file.splats.n_splats, bool)
         self.selection_sets: Mapping[str, NDArray[np.bool_]] = {}
         self.active_handles: tuple[int, ...] = ()
+        self.picked: int | None = None
         self.surface_changed = Signal()
         self.edit_changed = Signal()
         self.preview_changed = Signal()
@@ -43,6 +44,7 @@ class Scene:
         self.hidden_changed = Signal()
         self.selection_sets_changed = Signal()
         self.active_handles_changed = Signal()
+        self.picked_changed = Signal()
 
     @property
     def splats(self) -> Splats:
@@ -107,3 +109,9 @@ class Scene:
         if handle_ids != self.active_handles:
             self.active_handles = handle_ids
             self.active_handles_changed.emit()
+
+    def set_picked(self, row: int | None) -> None:
+        """Choose the splat that is inspected, by file row, or none."""
+        if row != self.picked:
+            self.picked = row
+            self.picked_changed.emit()

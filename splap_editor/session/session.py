@@ -1,19 +1,20 @@
 """One open scene, its history and its background work: what the window and its tools talk to."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.deformer import Deformation, Deformer, Handles
+from splap_editor.core.deformer import Deformation
 from splap_editor.core.handle_nodes import Region
 from splap_editor.core.kernel_adaptation import AdaptedKernels, adapted_splats
 from splap_editor.core.occupancy import occupancy_ellipses
 from splap_editor.core.splat_graph import GraphOptions
 from splap_editor.io.ply import read_ply, write_ply
 from splap_editor.io.recipe import read_recipe, write_recipe
+from splap_editor.session.bound_edit import BoundEdit, snapshot_of
 from splap_editor.session.cache import StageCache
 from splap_editor.session.commands import ChangeEdit, ChangeMask
 from splap_editor.session.edit import HANDLE_COLORS, Edit, Handle, Pose, binds_like, poses_like
@@ -22,21 +23,13 @@ from splap_editor.session.history import History
 from splap_editor.session.jobs import Job, Post, Worker
 from splap_editor.session.keyframes import auto_keyed_edit
 from splap_editor.session.pipeline import Surface, deformer_of, handles_of, kernels_of, surface_of
+from splap_editor.session.quantities import columns_of
 from splap_editor.session.recipe_edit import edit_of, recipe_of
 from splap_editor.session.scene import Scene
 from splap_editor.session.signals import Signal
 
 Presenter = Callable[[AdaptedKernels | None], object]
 """Prepares on the worker what the view needs of new kernels, such as a drawing order."""
-
-
-@dataclass(frozen=True, eq=False)
-class BoundEdit:
-    """A deformer, and the edit it was bound for."""
-
-    edit: Edit
-    handles: Handles
-    deformer: Deformer
 
 
 class Session:
@@ -61,6 +54,8 @@ class Session:
         self.worker = Worker(post)
         # Sorting and colouring for a turned view must not wait behind a scene that is being prepared.
         self.view_worker = Worker(post, name="splap-view")
+        # Nor behind quantities, edge colours and previews, which may take seconds.
+        self.detail_worker = Worker(post, name="splap-detail")
         self.worker.on_progress = lambda job: self.job_changed.emit(job)
         self.worker.on_busy = lambda job: self.job_changed.emit(job)
         self.cache = cache
@@ -76,7 +71,7 @@ class Session:
         self._bound: BoundEdit | None = None
         self._shown: tuple[Edit, bool] | None = None
         self._given_up: Edit | None = None
-        self._pending_export: tuple[Path, dict] | None = None
+        self._pending_export: tuple[Path, tuple[str, ...], dict] | None = None
         self._exported_edit: Edit | None = None
         self._jobs: dict[str, tuple[Job, object]] = {}
 
@@ -105,9 +100,9 @@ class Session:
         cancels = ("open", "prepare", "bind", "pose")
         self._submit("open", f"Opening {path.name}", read, self._show, cancels=cancels)
 
-    def export(self, path: Path, *, as_3dgs: bool = False) -> None:
+    def export(self, path: Path, *, as_3dgs: bool = False, columns: tuple[str, ...] = ()) -> None:
         """Write the splats on screen, once they have settled, as a PLY."""
-        self._pending_export = (path, {"as_3dgs": as_3dgs})
+        self._pending_export = (path, columns, {"as_3dgs": as_3dgs})
         self._advance()
 
     def save_edit(self, path: Path) -> None:
@@ -205,6 +200,7 @@ class Session:
         """Cancel everything and join the workers."""
         self.worker.close()
         self.view_worker.close()
+        self.detail_worker.close()
 
     @property
     def bound(self) -> BoundEdit | None:
@@ -335,14 +331,14 @@ class Session:
     def _export_pending(self, scene: Scene) -> None:
         if self._pending_export is None or scene.preview is not None:
             return
-        (path, options), self._pending_export = self._pending_export, None
-        file, kernels, edit = scene.file, scene.kernels, scene.edit
+        (path, columns, options), self._pending_export = self._pending_export, None
+        file, kernels, edit, snapshot = scene.file, scene.kernels, scene.edit, snapshot_of(scene, self._bound)
 
         def export(job: Job) -> ExportReport:
             job.report(0.1, "rotating colours")
             splats = file.splats if kernels is None else adapted_splats(file.splats, kernels)
             job.report(0.5, "writing")
-            write_ply(path, file, splats, **options)
+            write_ply(path, file, splats, extra=columns_of(columns, snapshot), **options)
             return export_report(path, file.splats, kernels)
 
         def done(report: ExportReport) -> None:
