@@ -100,11 +100,11 @@ def _deform(options: argparse.Namespace) -> int:
     from splap_editor.session.cache import StageCache
     from splap_editor.session.export_report import export_report
     from splap_editor.session.pipeline import deformer_of, handles_of, kernels_of, surface_of
-    from splap_editor.session.quantities import Snapshot, columns_of
+    from splap_editor.session.quantities import Snapshot, column_names, columns_of
     from splap_editor.session.recipe_edit import edit_of
 
     report = StageReport(quiet=options.quiet or options.json)
-    columns = [name.strip() for name in options.columns.split(",") if name.strip()]
+    columns = column_names(options.columns)
     recipe = read_recipe(options.recipe)
     with report("read"):
         file = read_ply(options.file, layout=options.layout, progress=report.progress)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -242,18 +242,25 @@ QUANTITIES: dict[str, Quantity] = {
 }
 
 
-def columns_of(names: ArrayLike, snapshot: Snapshot) -> dict[str, NDArray[np.float64]]:
+def column_names(text: str) -> tuple[str, ...]:
+    """Read names of quantities, with commas between them; ValueError for one that there is not."""
+    names = tuple(name.strip() for name in text.split(",") if name.strip())
+    for name in names:
+        if name not in QUANTITIES:
+            raise ValueError(f"there is no quantity {name!r}; there are {', '.join(QUANTITIES)}")
+    return names
+
+
+def columns_of(names: Iterable[str], snapshot: Snapshot) -> dict[str, NDArray[np.float64]]:
     """Work out quantities to be written as columns of a PLY, by name.
 
     Raises
     ------
     ValueError
-        A name is no quantity's, or what it needs is not there.
+        What a quantity needs is not there.
     """
     columns = {}
     for name in names:
-        if name not in QUANTITIES:
-            raise ValueError(f"there is no quantity {name!r}; there are {', '.join(QUANTITIES)}")
         lack = missing(QUANTITIES[name], snapshot)
         if lack:
             raise ValueError(f"the column {name!r} needs {lack}")

@@ -15,7 +15,7 @@ from splap_editor.io.ply import read_ply
 from splap_editor.resources import resource
 from splap_editor.session.edit import Edit, Handle, Pose
 from splap_editor.session.pipeline import Surface, deformer_of, handles_of, kernels_of, surface_of
-from splap_editor.session.quantities import QUANTITIES, Snapshot, columns_of, missing, principal_stretches
+from splap_editor.session.quantities import QUANTITIES, Snapshot, column_names, columns_of, missing, principal_stretches
 
 AT_REST = {"displacement": 0.0, "stretch": 1.0, "least_stretch": 1.0, "rotation": 0.0}
 
@@ -120,7 +120,7 @@ def test_what_lacks_says_what_it_waits_for(snapshot):
     with pytest.raises(ValueError, match="'degree' needs the surface"):
         columns_of(["degree"], bare)
     with pytest.raises(ValueError, match="there is no quantity 'colour'; there are alpha"):
-        columns_of(["colour"], bare)
+        column_names("size, colour")
 
 
 def test_columns_are_the_values_by_name(snapshot):
