@@ -86,7 +86,8 @@ class SceneView:
         self._scene: Scene | None = None
         self._shows_tints = True
         self._tinted_for: tuple[object, ...] = ()
-        self._paint: NDArray[np.uint8] | None = None
+        self._paints: dict[str, NDArray[np.uint8]] = {}
+        self._marks: tuple[tuple[NDArray[np.integer], tuple[int, int, int, int]], ...] = ()
         self._wants_view = False
         self._view_job: Job | None = None
         self._seen = SeenFrom(np.zeros(3), np.array([0.0, 0.0, -1.0], np.float32), False)
@@ -112,11 +113,27 @@ class SceneView:
         self._shows_tints = on
         self._show_tints()
 
-    def paint(self, colors: NDArray[np.uint8] | None) -> None:
-        """Lay colours (N, 4) uint8, the fourth their share, over the splats in place of the tints; None: the tints."""
-        self._paint = colors
-        self._tinted_for = ("paint",)
+    def paint(self, colors: NDArray[np.uint8] | None, layer: str = "weights") -> None:
+        """Lay colours (N, 4) uint8, the fourth their share, over the splats in place of the tints; None: the tints.
+
+        Of several layers the one painted last is seen.
+        """
+        if colors is None:
+            self._paints.pop(layer, None)
+        elif layer in self._paints:
+            self._paints[layer] = colors
+        else:
+            self._paints = {**self._paints, layer: colors}
+        self._tinted_for = ("stale",)
         self._show_tints()
+
+    def mark(self, marks: Iterable[tuple[NDArray[np.integer], tuple[int, int, int, int]]]) -> None:
+        """Lay a colour and its share, 0..255, over some file rows, above tints and paint; none: no marks."""
+        marks = tuple(marks)
+        if marks or self._marks:
+            self._marks = marks
+            self._tinted_for = ("stale",)
+            self._show_tints()
 
     def rows_of_handles(self, handle_ids: Iterable[int]) -> NDArray[np.int64]:
         """File rows that these handles hold, empty while nothing is bound."""
@@ -145,8 +162,7 @@ class SceneView:
 
     def _on_scene_changed(self) -> None:
         self._scene = scene = self._session.scene
-        self._tinted_for = ()
-        self._paint = None
+        self._tinted_for, self._paints, self._marks = (), {}, ()
         self.viewport.gizmo.detach()
         scene.pose_changed.connect(self._show_pose)
         scene.selection_changed.connect(self._show_flags)
@@ -215,27 +231,35 @@ class SceneView:
         scene, bound = self._scene, self._session.bound
         if not self._is_shown:
             return
-        if self._paint is not None:
-            if self._tinted_for != ("painted",):
-                self._tinted_for = ("painted",)
-                self.viewport.splats.set_tints(self._paint)
-            return
+        paint = next(reversed(self._paints.values()), None)
         colors = tuple(handle.color for handle in scene.edit.active_handles)
         is_known = bound is not None and len(bound.edit.active_handles) == len(colors) > 0
         wanted = (bound, colors) if self._shows_tints and is_known else ()
+        if paint is not None:
+            wanted = ("painted",)
         if wanted == self._tinted_for:
             return
         self._tinted_for = wanted
-        if not wanted:
+        if not wanted and not self._marks:
             self.viewport.splats.set_tints(None)
             return
-        tints = np.zeros((scene.splats.n_splats, 4), np.uint8)
+        tints = np.zeros((scene.splats.n_splats, 4), np.uint8) if paint is None else paint
+        if wanted and paint is None:
+            self._tint_handles(tints)
+        if self._marks:
+            tints = tints.copy()
+            for marked, rgba in self._marks:
+                tints[marked] = rgba
+        self.viewport.splats.set_tints(tints)
+
+    def _tint_handles(self, tints: NDArray[np.uint8]) -> None:
+        scene, bound = self._scene, self._session.bound
+        colors = [handle.color for handle in scene.edit.active_handles]
         rows = scene.ellipses.rows[bound.handles.indices]
         is_pinned = bound.handles.labels < 0
         tints[rows[is_pinned]] = FIXED_TINT
         palette = np.array([(*_rgb(color), HANDLE_SHARE) for color in colors], np.uint8)
         tints[rows[~is_pinned]] = palette[bound.handles.labels[~is_pinned]]
-        self.viewport.splats.set_tints(tints)
 
     # Colours and order of a view ----------------------------------------------------------------------------------
 
