@@ -23,6 +23,9 @@ _CIRCLE = 1e-9
 
 _HALF_ROOT_3 = 0.5 * math.sqrt(3.0)
 
+# Nodes fitted side by side: enough to fill vector registers many times, few enough for the processor's first cache.
+_LANES = 128
+
 
 class KernelArrays(NamedTuple):
     """What the compiled loops write.
@@ -116,56 +119,13 @@ def find_motions(stencils, inverse_moments, dampings, rest, positions, rotations
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract"})
-def carry_triangles(carriers, weights, centers, semi_axes, motions, moved, lo, hi, carried, images):
-    """Move the corners of the inscribed triangles of nodes lo to hi - 1 with their carriers.
-
-    Row i - lo of ``images`` becomes centre, major and minor conjugate half-diameter of the moved triangle's Steiner
-    circumellipse; ``carried`` tells whether any carrier has moved.
-    """
-    blend = np.empty(12)
-    for i in range(lo, hi):
-        any_moved = False
-        for k in range(9):
-            any_moved |= weights[i, k] > 0.0 and moved[carriers[i, k]]
-        carried[i - lo] = any_moved
-        if not any_moved:
-            continue
-        mx = my = mz = ax = ay = az = bx = by = bz = 0.0
-        for c in range(3):
-            # Corner c of the triangle is the centre + along v1 + across v2.
-            along = 1.0 if c == 0 else -0.5
-            across = 0.0 if c == 0 else (_HALF_ROOT_3 if c == 1 else -_HALF_ROOT_3)
-            px = centers[i, 0] + along * semi_axes[i, 0, 0] + across * semi_axes[i, 1, 0]
-            py = centers[i, 1] + along * semi_axes[i, 0, 1] + across * semi_axes[i, 1, 1]
-            pz = centers[i, 2] + along * semi_axes[i, 0, 2] + across * semi_axes[i, 1, 2]
-            k = 3 * c
-            j0, j1, j2 = carriers[i, k], carriers[i, k + 1], carriers[i, k + 2]
-            w0, w1, w2 = weights[i, k], weights[i, k + 1], weights[i, k + 2]
-            for k in range(12):
-                blend[k] = w0 * motions[j0, k] + w1 * motions[j1, k] + w2 * motions[j2, k]
-            x = blend[0] * px + blend[3] * py + blend[6] * pz + blend[9]
-            y = blend[1] * px + blend[4] * py + blend[7] * pz + blend[10]
-            z = blend[2] * px + blend[5] * py + blend[8] * pz + blend[11]
-            # The affine map from the reference triangle to the moved one, applied to its centre, v1 and v2.
-            third = 1.0 / 3.0
-            mx, my, mz = mx + third * x, my + third * y, mz + third * z
-            third *= 2.0 * along
-            ax, ay, az = ax + third * x, ay + third * y, az + third * z
-            third = 2.0 / 3.0 * across
-            bx, by, bz = bx + third * x, by + third * y, bz + third * z
-        k = i - lo
-        images[k, 0], images[k, 1], images[k, 2] = mx, my, mz
-        images[k, 3], images[k, 4], images[k, 5] = ax, ay, az
-        images[k, 6], images[k, 7], images[k, 8] = bx, by, bz
-
-
-@nb.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract"})
-def map_rings(hops, indptr, indices, centers, semi_axes, positions, rotations, moved, lo, hi, carried, images):
-    """Map ellipses by the least-squares affine map of their node's ``hops``-ring; rows as in `carry_triangles`."""
-    seen = np.full(len(positions), -1, np.int64)
-    ring = np.empty(len(positions), np.int64)
+def find_ring_motions(hops, indptr, indices, rest, positions, rotations, still, moved, motions):
+    """Least-squares affine map of each node's ``hops``-ring, as in `find_motions`; moved if any of the ring is."""
+    n = len(positions)
+    seen = np.full(n, -1, np.int64)
+    ring = np.empty(n, np.int64)
     moments, cross = np.empty((3, 3)), np.empty((3, 3))
-    for i in range(lo, hi):
+    for i in range(n):
         seen[i], ring[0] = i, i
         first, end = 0, 1
         for _ in range(hops):
@@ -177,97 +137,198 @@ def map_rings(hops, indptr, indices, centers, semi_axes, positions, rotations, m
                         seen[j], ring[end] = i, j
                         end += 1
             first = last
-        any_moved = False
+        moved[i] = False
         moments[:] = 0.0
         cross[:] = 0.0
         for k in range(end):
             j = ring[k]
-            any_moved |= moved[j]
+            moved[i] |= _has_moved(j, rest, positions, rotations, still)
             for a in range(3):
                 for b in range(3):
-                    edge = centers[j, b] - centers[i, b]
-                    moments[a, b] += edge * (centers[j, a] - centers[i, a])
+                    edge = rest[j, b] - rest[i, b]
+                    moments[a, b] += edge * (rest[j, a] - rest[i, a])
                     cross[a, b] += edge * (positions[j, a] - positions[i, a])
-        carried[i - lo] = any_moved
-        if not any_moved:
-            continue
         trace = moments[0, 0] + moments[1, 1] + moments[2, 2]
         # Directions that the ring does not span turn with the node; the share is too small to be felt in the others.
         damping = 1e-6 if trace > 1e-90 else 1.0
         shrink = 1.0 / trace if trace > 1e-90 else 0.0
         for a in range(3):
+            motions[i, 9 + a] = positions[i, a]
             for b in range(3):
                 moments[a, b] = shrink * moments[a, b] + (damping if a == b else 0.0)
                 cross[a, b] = shrink * cross[a, b] + damping * rotations[i, a, b]
         inverse = np.linalg.inv(moments)
         for a in range(3):
-            images[i - lo, a] = positions[i, a]
-            images[i - lo, 3 + a] = images[i - lo, 6 + a] = 0.0
             for b in range(3):
                 A = cross[a, 0] * inverse[0, b] + cross[a, 1] * inverse[1, b] + cross[a, 2] * inverse[2, b]
-                images[i - lo, 3 + a] += A * semi_axes[i, 0, b]
-                images[i - lo, 6 + a] += A * semi_axes[i, 1, b]
+                motions[i, 3 * b + a] = A
+                motions[i, 9 + a] -= A * rest[i, b]
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract"})
-def write_kernels(lo, hi, carried, images, rest, rotations, out):
-    """Write the kernels of nodes lo to hi - 1 from the conjugate half-diameters of their moved ellipses.
+def write_kernels(carriers, weights, motions, moved, rotations, rest, out):
+    """Move the corners of each inscribed triangle with their carriers and write the Steiner circumellipses.
 
-    The map of the rest plane is split into a stretch within the plane and a rotation. The principal axes of the
-    stretched ellipse are named after the rest axes they are within 45° of.
+    In groups of nodes: their triangles are carried one by one, the ellipses are found side by side by vector
+    instructions, and the results are put in place one by one.
     """
     # Unpacked once: each access to an array of a tuple counts a reference.
-    rest_means, rest_axes_f32, order, semi_axes, lengths, cutoffs = rest
+    rest_means, rest_axes_f32, order, ellipses = rest
     means, turns, growths, twists, changed, means_f32, axes_f32 = out
-    for i in range(lo, hi):
-        row = order[i]
-        if not carried[i - lo]:
-            _write_rest(i, row, rest_means, rest_axes_f32, means, turns, growths, twists, changed, means_f32, axes_f32)
-            continue
-        length1, length2 = lengths[i, 0], lengths[i, 1]
+    n = len(carriers)
+    lanes = np.zeros(34 * _LANES)
+    for lo in range(0, n, _LANES):
+        count = min(_LANES, n - lo)
+        # Rows lie all over the file. Reading the places to be written lets the processor fetch them side by side.
+        fetched = np.float32(0.0)
+        for i in range(lo, lo + count):
+            fetched += means_f32[order[i], 0] + axes_f32[order[i], 0, 0] + axes_f32[order[i], 1, 2]
+        lanes[0] = fetched
+        for lane in range(count):
+            i = lo + lane
+            any_moved = False
+            for k in range(9):
+                any_moved |= weights[i, k] > 0.0 and moved[carriers[i, k]]
+            changed[i] = any_moved
+            if any_moved:
+                _carry_triangle(i, lane, carriers, weights, motions, rotations, ellipses, lanes)
+        _fit_ellipses(count, lanes)
+        for lane in range(count):
+            i = lo + lane
+            row = order[i]
+            if not changed[i]:
+                _write_rest(
+                    i, row, rest_means, rest_axes_f32, means, turns, growths, twists, changed, means_f32, axes_f32
+                )
+                continue
+            per_cutoff = ellipses[i, 11]
+            for a in range(3):
+                means[i, a] = means_f32[row, a] = lanes[(12 + a) * _LANES + lane]
+                axes_f32[row, 0, a] = per_cutoff * lanes[(24 + a) * _LANES + lane]
+                axes_f32[row, 1, a] = per_cutoff * lanes[(27 + a) * _LANES + lane]
+                for b in range(3):
+                    turns[i, a, b] = lanes[(15 + 3 * a + b) * _LANES + lane]
+            growths[i, 0], growths[i, 1] = lanes[30 * _LANES + lane], lanes[31 * _LANES + lane]
+            twists[i, 0], twists[i, 1] = lanes[32 * _LANES + lane], lanes[33 * _LANES + lane]
+
+
+@nb.njit(inline="always")
+def _carry_triangle(i, lane, carriers, weights, motions, rotations, ellipses, lanes):
+    """Rows 0 to 14 of a lane: both rest semi-axes, their images under the triangle's affine map, and its centre."""
+    mx = my = mz = ax = ay = az = bx = by = bz = 0.0
+    for c in range(3):
+        # Corner c of the triangle is the centre + along v1 + across v2.
+        along = 1.0 if c == 0 else -0.5
+        across = 0.0 if c == 0 else (_HALF_ROOT_3 if c == 1 else -_HALF_ROOT_3)
+        px = ellipses[i, 0] + along * ellipses[i, 3] + across * ellipses[i, 6]
+        py = ellipses[i, 1] + along * ellipses[i, 4] + across * ellipses[i, 7]
+        pz = ellipses[i, 2] + along * ellipses[i, 5] + across * ellipses[i, 8]
+        x = y = z = 0.0
+        for k in range(3 * c, 3 * c + 3):
+            j, w = carriers[i, k], weights[i, k]
+            x += w * (motions[j, 0] * px + motions[j, 3] * py + motions[j, 6] * pz + motions[j, 9])
+            y += w * (motions[j, 1] * px + motions[j, 4] * py + motions[j, 7] * pz + motions[j, 10])
+            z += w * (motions[j, 2] * px + motions[j, 5] * py + motions[j, 8] * pz + motions[j, 11])
+        mx, my, mz = mx + x, my + y, mz + z
+        ax, ay, az = ax + along * x, ay + along * y, az + along * z
+        bx, by, bz = bx + across * x, by + across * y, bz + across * z
+    third = 1.0 / 3.0
+    ax, ay, az = 2.0 * third * ax, 2.0 * third * ay, 2.0 * third * az
+    bx, by, bz = 2.0 * third * bx, 2.0 * third * by, 2.0 * third * bz
+    for k in range(6):
+        lanes[k * _LANES + lane] = ellipses[i, 3 + k]
+    lanes[6 * _LANES + lane], lanes[7 * _LANES + lane], lanes[8 * _LANES + lane] = ax, ay, az
+    lanes[9 * _LANES + lane], lanes[10 * _LANES + lane], lanes[11 * _LANES + lane] = bx, by, bz
+    lanes[12 * _LANES + lane] = third * mx
+    lanes[13 * _LANES + lane] = third * my
+    lanes[14 * _LANES + lane] = third * mz
+    # Growths along the semi-axes, and that of the area between them: all squared.
+    nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    grow1 = ellipses[i, 9] ** 2 * (ax * ax + ay * ay + az * az)
+    grow2 = ellipses[i, 10] ** 2 * (bx * bx + by * by + bz * bz)
+    area = ellipses[i, 9] ** 2 * ellipses[i, 10] ** 2 * (nx * nx + ny * ny + nz * nz)
+    if area > MIN_SHRINK**2 * (grow1 + grow2) ** 2 and area > MIN_SHRINK**4:
+        return
+    # Collapsed: there is no plane to be read off, the axes take the node's own rotation and keep their growths.
+    grow1, grow2 = max(math.sqrt(grow1), MIN_SHRINK), max(math.sqrt(grow2), MIN_SHRINK)
+    for a in range(3):
+        turned1 = turned2 = 0.0
+        for b in range(3):
+            turned1 += rotations[i, a, b] * ellipses[i, 3 + b]
+            turned2 += rotations[i, a, b] * ellipses[i, 6 + b]
+        lanes[(6 + a) * _LANES + lane], lanes[(9 + a) * _LANES + lane] = grow1 * turned1, grow2 * turned2
+
+
+@nb.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract"})
+def _fit_ellipses(count, lanes):
+    """Split each lane's map of the rest plane into a stretch within the plane and a rotation.
+
+    Rows 15 to 33 receive the rotation, the semi-axes of the stretched ellipse, their growths, and the cosine and sine
+    of their turn from the rest axes they are within 45° of. Free of branches, and all in one array with rows a known
+    distance apart, so that the loop becomes vector instructions.
+    """
+    for lane in range(count):
+        v1 = (lanes[0 * _LANES + lane], lanes[1 * _LANES + lane], lanes[2 * _LANES + lane])
+        v2 = (lanes[3 * _LANES + lane], lanes[4 * _LANES + lane], lanes[5 * _LANES + lane])
+        length1, length2 = math.sqrt(_dot(v1, v1)), math.sqrt(_dot(v2, v2))
         per1, per2 = 1.0 / length1, 1.0 / length2
-        e1 = _times(per1, (semi_axes[i, 0, 0], semi_axes[i, 0, 1], semi_axes[i, 0, 2]))
-        e2 = _times(per2, (semi_axes[i, 1, 0], semi_axes[i, 1, 1], semi_axes[i, 1, 2]))
+        e1, e2 = _times(per1, v1), _times(per2, v2)
         e3 = _cross(e1, e2)
-        g1 = _times(per1, (images[i - lo, 3], images[i - lo, 4], images[i - lo, 5]))
-        g2 = _times(per2, (images[i - lo, 6], images[i - lo, 7], images[i - lo, 8]))
+        g1 = _times(per1, (lanes[6 * _LANES + lane], lanes[7 * _LANES + lane], lanes[8 * _LANES + lane]))
+        g2 = _times(per2, (lanes[9 * _LANES + lane], lanes[10 * _LANES + lane], lanes[11 * _LANES + lane]))
+        # Polar decomposition of a 3 × 2 matrix: the rotation is the matrix plus its cofactor, to unit length.
         normal = _cross(g1, g2)
         area = math.sqrt(_dot(normal, normal))
+        q3 = _times(1.0 / area, normal)
         gram11, gram12, gram22 = _dot(g1, g1), _dot(g1, g2), _dot(g2, g2)
-        if area > MIN_SHRINK * (gram11 + gram22) and area > MIN_SHRINK * MIN_SHRINK:
-            # Polar decomposition of a 3 × 2 matrix: the rotation is the matrix plus its cofactor, to unit length.
-            q3 = _times(1.0 / area, normal)
-            s = 1.0 / math.sqrt(gram11 + gram22 + 2.0 * area)
-            q1, q2 = _times(s, _plus(g1, _cross(g2, q3))), _times(s, _plus(g2, _cross(q3, g1)))
-            h11, h12, h21, h22 = s * (gram11 + area), s * gram12, s * gram12, s * (gram22 + area)
-        else:
-            # Collapsed: there is no plane to be read off, the node's own takes its place.
-            q1, q2 = _turned(rotations, i, e1), _turned(rotations, i, e2)
-            q3 = _cross(q1, q2)
-            h11, h12, h21, h22 = _dot(q1, g1), _dot(q1, g2), _dot(q2, g1), _dot(q2, g2)
-        # The map in the plane applied to the rest ellipse: second moments of the new one in the frame (q1, q2).
-        h11, h12, h21, h22 = h11 * length1, h12 * length2, h21 * length1, h22 * length2
-        length11, length22, cosine, sine = _principal_lengths(
-            h11 * h11 + h12 * h12, h11 * h21 + h12 * h22, h21 * h21 + h22 * h22, h11 * h22 - h12 * h21
+        s = 1.0 / math.sqrt(gram11 + gram22 + 2.0 * area)
+        q1, q2 = _times(s, _plus(g1, _cross(g2, q3))), _times(s, _plus(g2, _cross(q3, g1)))
+        # Second moments, in the frame (q1, q2), of the rest ellipse stretched by the symmetric other factor.
+        h11, h12, h21, h22 = (
+            s * (gram11 + area) * length1,
+            s * gram12 * length2,
+            s * gram12 * length1,
+            s * (gram22 + area) * length2,
         )
-        growth1, growth2 = max(per1 * length11, MIN_SHRINK), max(per2 * length22, MIN_SHRINK)
-        per_sigma = 1.0 / cutoffs[i]
-        sigma1, sigma2 = per_sigma * growth1 * length1, per_sigma * growth2 * length2
-        for a in range(3):
-            means[i, a] = means_f32[row, a] = images[i - lo, a]
-            axes_f32[row, 0, a] = sigma1 * (cosine * q1[a] + sine * q2[a])
-            axes_f32[row, 1, a] = sigma2 * (cosine * q2[a] - sine * q1[a])
-            for b in range(3):
-                turns[i, a, b] = q1[a] * e1[b] + q2[a] * e2[b] + q3[a] * e3[b]
-        growths[i, 0], growths[i, 1] = growth1, growth2
-        twists[i, 0], twists[i, 1] = cosine, sine
-        changed[i] = True
+        b11, b12, b22 = h11 * h11 + h12 * h12, h11 * h21 + h12 * h22, h21 * h21 + h22 * h22
+        middle, half = 0.5 * (b11 + b22), 0.5 * (b11 - b22)
+        # On the axes already; of a circle, whose axes are anywhere, this keeps those of the rest frame.
+        straight = abs(b12) <= _CIRCLE * middle
+        spread = math.sqrt(half * half + b12 * b12) + (1.0 if straight else 0.0)
+        cosine = math.sqrt(0.5 + 0.5 * abs(half) / spread)
+        large = math.sqrt(middle + spread)
+        # From the determinant, since the difference of middle and spread would lose a needle's width.
+        small = (h11 * h22 - h12 * h21) / large
+        sine = 0.5 * b12 / (cosine * spread)
+        sine = 0.0 if straight else (sine if half >= 0.0 else -sine)
+        cosine = 1.0 if straight else cosine
+        root1, root2 = math.sqrt(b11), math.sqrt(b22)
+        half1 = root1 if straight else (large if half >= 0.0 else small)
+        half2 = root2 if straight else (small if half >= 0.0 else large)
+        growth1, growth2 = per1 * half1, per2 * half2
+        growth1 = growth1 if growth1 > MIN_SHRINK else MIN_SHRINK
+        growth2 = growth2 if growth2 > MIN_SHRINK else MIN_SHRINK
+        axis1 = _times(growth1 * length1, _plus(_times(cosine, q1), _times(sine, q2)))
+        axis2 = _times(growth2 * length2, _plus(_times(cosine, q2), _times(-sine, q1)))
+        lanes[15 * _LANES + lane] = q1[0] * e1[0] + q2[0] * e2[0] + q3[0] * e3[0]
+        lanes[16 * _LANES + lane] = q1[0] * e1[1] + q2[0] * e2[1] + q3[0] * e3[1]
+        lanes[17 * _LANES + lane] = q1[0] * e1[2] + q2[0] * e2[2] + q3[0] * e3[2]
+        lanes[18 * _LANES + lane] = q1[1] * e1[0] + q2[1] * e2[0] + q3[1] * e3[0]
+        lanes[19 * _LANES + lane] = q1[1] * e1[1] + q2[1] * e2[1] + q3[1] * e3[1]
+        lanes[20 * _LANES + lane] = q1[1] * e1[2] + q2[1] * e2[2] + q3[1] * e3[2]
+        lanes[21 * _LANES + lane] = q1[2] * e1[0] + q2[2] * e2[0] + q3[2] * e3[0]
+        lanes[22 * _LANES + lane] = q1[2] * e1[1] + q2[2] * e2[1] + q3[2] * e3[1]
+        lanes[23 * _LANES + lane] = q1[2] * e1[2] + q2[2] * e2[2] + q3[2] * e3[2]
+        lanes[24 * _LANES + lane], lanes[25 * _LANES + lane], lanes[26 * _LANES + lane] = axis1
+        lanes[27 * _LANES + lane], lanes[28 * _LANES + lane], lanes[29 * _LANES + lane] = axis2
+        lanes[30 * _LANES + lane], lanes[31 * _LANES + lane] = growth1, growth2
+        lanes[32 * _LANES + lane], lanes[33 * _LANES + lane] = cosine, sine
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract"})
 def adapt_inert(carriers, weights, rest, positions, rotations, moved, out):
     """Move and turn the splats outside the graph with the blended rigid motion of their carriers."""
-    rest_means, rest_axes_f32, order, _, _, _ = rest
+    rest_means, rest_axes_f32, order, _ = rest
     means, turns, growths, twists, changed, means_f32, axes_f32 = out
     blend = np.empty((3, 3))
     for r in range(len(carriers)):
@@ -299,24 +360,6 @@ def adapt_inert(carriers, weights, rest, positions, rotations, moved, out):
             axes_f32[row, axis, 0], axes_f32[row, axis, 1], axes_f32[row, axis, 2] = _turned(turns, i, u)
 
 
-@nb.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract"})
-def _principal_lengths(b11, b12, b22, root_determinant):
-    """Half-lengths along the axes nearest to the first and second, with cosine and sine of their turn (within 45°)."""
-    middle, half = 0.5 * (b11 + b22), 0.5 * (b11 - b22)
-    if abs(b12) <= _CIRCLE * middle:
-        # On the axes already; of a circle, whose axes are anywhere, this keeps those of the rest frame.
-        return math.sqrt(b11), math.sqrt(b22), 1.0, 0.0
-    spread = math.sqrt(half * half + b12 * b12)
-    cosine = math.sqrt(0.5 + 0.5 * abs(half) / spread)
-    large = math.sqrt(middle + spread)
-    # From the determinant, since the difference of middle and spread would lose a needle's width.
-    small = abs(root_determinant) / large
-    sine = 0.5 * b12 / (cosine * spread)
-    if half >= 0.0:
-        return large, small, cosine, sine
-    return small, large, cosine, -sine
-
-
 @nb.njit(inline="always")
 def _has_moved(i, rest, positions, rotations, still):
     displaced = max(
@@ -345,27 +388,27 @@ def _write_rest(i, row, rest_means, rest_axes_f32, means, turns, growths, twists
     changed[i] = False
 
 
-@nb.njit
+@nb.njit(inline="always")
 def _dot(a, b):
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@nb.njit
+@nb.njit(inline="always")
 def _cross(a, b):
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@nb.njit
+@nb.njit(inline="always")
 def _plus(a, b):
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
-@nb.njit
+@nb.njit(inline="always")
 def _times(s, a):
     return s * a[0], s * a[1], s * a[2]
 
 
-@nb.njit
+@nb.njit(inline="always")
 def _turned(rotations, i, a):
     return (
         rotations[i, 0, 0] * a[0] + rotations[i, 0, 1] * a[1] + rotations[i, 0, 2] * a[2],

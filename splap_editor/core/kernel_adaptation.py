@@ -1,7 +1,7 @@
 """Splats whose ellipses keep covering the surface when it is deformed."""
 
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -11,10 +11,9 @@ from splap_editor.core.carried_ellipses import (
     STILL_SHARE,
     KernelArrays,
     adapt_inert,
-    carry_triangles,
     find_motions,
     find_moved,
-    map_rings,
+    find_ring_motions,
     write_kernels,
 )
 from splap_editor.core.deformer import Deformation
@@ -22,8 +21,6 @@ from splap_editor.core.kernel_binding import KernelBinding
 from splap_editor.core.rotations import matrices_to_quats, quat_products
 from splap_editor.core.spherical_harmonics import rotated_sh
 from splap_editor.core.splats import Splats
-
-_BLOCK = 8192
 
 AdaptationMethod = Literal["surface", "affine", "none"]
 
@@ -183,23 +180,22 @@ def adapt_kernels(
     arrays = _blank_arrays(binding, out)
     moved = np.empty(len(positions), np.bool_)
     still = STILL_SHARE * binding.ellipses.scene_scale
-    if method == "surface":
-        motions = _spare_motions(binding)
-        stencils = binding.stencils, binding.inverse_moments, binding.dampings
-        find_motions(*stencils, rest.means, positions, rotations, still, moved, motions)
-        carry = partial(carry_triangles, binding.carriers, binding.weights, rest.means, rest.semi_axes, motions, moved)
-        _write_images(carry, rest, rotations, arrays)
-        binding.spare_motions.append(motions)
-    elif method == "affine":
-        find_moved(rest.means, positions, rotations, still, moved)
-        graph = binding.graph
-        carry = partial(
-            map_rings, hops, graph.indptr, graph.indices, rest.means, rest.semi_axes, positions, rotations, moved
-        )
-        _write_images(carry, rest, rotations, arrays)
-    else:
-        find_moved(rest.means, positions, rotations, still, moved)
+    nodes = rest.means, positions, rotations, still, moved
+    if method == "none":
+        find_moved(*nodes)
         _move_centers(rest, positions, moved, arrays)
+    else:
+        motions = _spare_motions(binding)
+        carriers, weights = binding.carriers, binding.weights
+        if method == "surface":
+            find_motions(binding.stencils, binding.inverse_moments, binding.dampings, *nodes, motions)
+        else:
+            find_ring_motions(hops, binding.graph.indptr, binding.graph.indices, *nodes, motions)
+            # Each splat carries itself.
+            carriers = np.repeat(np.arange(len(positions), dtype=np.int32)[:, None], 9, axis=1)
+            weights = np.tile([1.0, 0.0, 0.0], (len(positions), 3))
+        write_kernels(carriers, weights, motions, moved, rotations, rest, arrays)
+        binding.spare_motions.append(motions)
     adapt_inert(binding.inert_carriers, binding.inert_weights, rest, positions, rotations, moved, arrays)
     return AdaptedKernels(binding, arrays)
 
@@ -284,15 +280,6 @@ def _spare_motions(binding):
         return binding.spare_motions.pop()
     except IndexError:
         return np.empty((binding.ellipses.n_nodes, 12))
-
-
-def _write_images(carry, rest, rotations, arrays):
-    """Carry the ellipses and write their kernels, in blocks that stay in the processor's cache in between."""
-    carried, images = np.empty(_BLOCK, np.bool_), np.empty((_BLOCK, 9))
-    for lo in range(0, len(rotations), _BLOCK):
-        hi = min(lo + _BLOCK, len(rotations))
-        carry(lo, hi, carried, images)
-        write_kernels(lo, hi, carried, images, rest, rotations, arrays)
 
 
 def _move_centers(rest, positions, moved, arrays):

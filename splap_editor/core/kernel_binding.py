@@ -37,20 +37,15 @@ class RestArrays(NamedTuple):
         In-plane axes of one standard deviation, in carried order; zero where undefined.
     order : (N,) int64
         File row of each place in carried order.
-    semi_axes : (n, 2, 3) float64
-        Semi-axes of the occupancy ellipses.
-    lengths : (n, 2) float64
-        Their lengths.
-    cutoffs : (n,) float64
-        Semi-axis in units of the standard deviation.
+    ellipses : (n, 12) float64
+        Centre, both semi-axes, the inverses of their lengths and of the cut-off: side by side, since the loop over
+        nodes waits for memory.
     """
 
     means: NDArray[np.float64]
     axes_f32: NDArray[np.float32]
     order: NDArray[np.int64]
-    semi_axes: NDArray[np.float64]
-    lengths: NDArray[np.float64]
-    cutoffs: NDArray[np.float64]
+    ellipses: NDArray[np.float64]
 
 
 class KernelBinding:
@@ -129,9 +124,14 @@ class KernelBinding:
             means=np.ascontiguousarray(splats.means, np.float64)[order],
             axes_f32=axes[order],
             order=order,
-            semi_axes=np.ascontiguousarray(ellipses.semi_axes, np.float64),
-            lengths=np.linalg.norm(ellipses.semi_axes, axis=2),
-            cutoffs=np.ascontiguousarray(ellipses.cutoffs, np.float64),
+            ellipses=np.column_stack(
+                [
+                    ellipses.centers,
+                    ellipses.semi_axes.reshape(-1, 6),
+                    1.0 / np.linalg.norm(ellipses.semi_axes, axis=2),
+                    1.0 / ellipses.cutoffs,
+                ]
+            ),
         )
         # Arrays of finished adaptations for the next ones: taking and giving back is atomic, so threads never share.
         self.spare_motions: list[NDArray[np.float64]] = []
