@@ -90,7 +90,7 @@ def write_rotation(rotations, i, w, x, y, z):
     rotations[i, 2, 2] = 1 - 2 * (x * x + y * y)
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(nogil=True, cache=True, fastmath={"contract", "reassoc", "arcp", "nsz"})
 def rotation_quaternion(a00, a01, a02, a10, a11, a12, a20, a21, a22):
     """Unit quaternion (w, x, y, z) of the rotation R that maximises ``trace(Rᵀ A)``.
 
@@ -139,6 +139,10 @@ def rotation_quaternion(a00, a01, a02, a10, a11, a12, a20, a21, a22):
     d01 = -(n01 * p - n12 * s + n13 * t)
     d02 = n01 * q - m11 * s + n13 * u
     d03 = -(n01 * r - m11 * t + n12 * u)
+    if abs(d00) > 0.1:
+        # Long enough; turns of less than a right angle mostly end here.
+        length = 1.0 / math.sqrt(d00 * d00 + d01 * d01 + d02 * d02 + d03 * d03)
+        return d00 * length, d01 * length, d02 * length, d03 * length
     d11 = m00 * p - n02 * s + n03 * t
     d12 = -(m00 * q - n01 * s + n03 * u)
     d13 = m00 * r - n01 * t + n02 * u
