@@ -186,6 +186,10 @@ class DisplayCommands:
         """Show the edit over a ghost of the original."""
         self._display.set(shown="both")
 
+    def weights(self, on: bool) -> None:
+        """Show how much each splat follows the chosen handle."""
+        self._display.set(weights=on)
+
 
 class ToolCommands:
     """Choosing the tool that the left button works with."""

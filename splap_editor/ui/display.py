@@ -1,5 +1,6 @@
 """How the scene is shown: one value that panel, menu and keys change and the viewport follows."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -39,6 +40,8 @@ class DisplayOptions:
         Key of `BACKGROUNDS`.
     tints : bool
         Handles in their colours, and what stays fixed darker.
+    weights : bool
+        The chosen handle's bounded biharmonic weights in bands of colour instead.
     """
 
     mode: str = "splats"
@@ -48,7 +51,11 @@ class DisplayOptions:
     backface: float = 0.0
     background: str = "dark"
     tints: bool = True
+    weights: bool = False
 
+
+LARGEST = 4.0
+"""Bound of every number among the options."""
 
 KEPT = ("mode", "backface", "background", "tints")
 """Options remembered between runs."""
@@ -84,6 +91,24 @@ class Display:
             self.options = options
             self.changed.emit()
 
+    def restore(self, held: Mapping[str, Any]) -> None:
+        """Take options from a session file; what is unknown, of another kind or out of bounds is left as it is."""
+        choices = {"mode": MODES, "background": BACKGROUNDS, "shown": [compare.value for compare in Compare]}
+        values = {}
+        for name, usual in vars(DisplayOptions()).items():
+            value = held.get(name)
+            if name in choices:
+                fits = isinstance(value, str) and value in choices[name]
+            elif isinstance(usual, bool):
+                fits = isinstance(value, bool)
+            else:
+                fits = isinstance(value, int | float) and not isinstance(value, bool) and 0.0 <= value <= LARGEST
+            if fits:
+                values[name] = value
+        # The mode first, since it brings its own size and cut.
+        self.set(mode=values.pop("mode", self.options.mode))
+        self.set(**values)
+
     def hold_original(self, is_held: bool) -> None:
         """Show the original while a key is held, and what was shown before when it is let go."""
         if is_held and self._held is None:
@@ -108,6 +133,8 @@ class Display:
         view.viewport.set_background(*BACKGROUNDS[options.background])
         if view.shows_tints != options.tints:
             view.shows_tints = options.tints
+        if view.weights.is_on != options.weights:
+            view.weights.is_on = options.weights
 
     def save(self) -> None:
         """Remember the options for the next run."""

@@ -9,13 +9,15 @@ from PySide6.QtCore import QSettings, QStandardPaths, Qt, QUrl
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QFileDialog, QMessageBox, QWidget
 
+from splap_editor.io.session_file import SUFFIX
 from splap_editor.resources import resource
+from splap_editor.session.documents import Documents
 from splap_editor.session.export_report import ExportReport
 from splap_editor.session.session import Session
 from splap_editor.ui.export_dialog import ExportDialog
 from splap_editor.ui.toast import Toast
 
-PLY_FILTER = "Splat PLY (*.ply);;All files (*)"
+OPEN_FILTER = "Splat PLY or session (*.ply *.splap);;All files (*)"
 EDIT_FILTER = "Edit (*.json);;All files (*)"
 SAMPLE = "windmill_2dgs.ply"
 
@@ -28,13 +30,25 @@ class FileCommands:
     window : QWidget
         Parent of the dialogs.
     session : Session
+    documents : Documents
     toast : Toast
         Where results and refusals are said.
+    save_then : callable
+        ``save_then(then)`` saves the session and goes on once that is done.
     """
 
-    def __init__(self, window: QWidget, session: Session, toast: Toast) -> None:
+    def __init__(
+        self,
+        window: QWidget,
+        session: Session,
+        documents: Documents,
+        toast: Toast,
+        save_then: Callable[[Callable[[], None]], None],
+    ) -> None:
         self._window = window
         self._session = session
+        self._documents = documents
+        self._save_then = save_then
         self._toast = toast
         self._after_export: Callable[[], None] | None = None
         session.exported.connect(self._on_exported)
@@ -43,19 +57,21 @@ class FileCommands:
     # ---------------------------------------------------------------- open
 
     def open(self) -> None:
-        """Ask for a PLY and open it."""
-        self._ask_to_read("Open a splat PLY", PLY_FILTER, self.open_path)
+        """Ask for a PLY or a session and open it."""
+        self._ask_to_read("Open a splat PLY or a session", OPEN_FILTER, self.open_path)
 
     def open_sample(self) -> None:
         """Open the bundled sample."""
         self.open_path(sample_path())
 
     def open_path(self, path: Path) -> None:
-        """Open a PLY or an edit, after asking about an edit that would be lost."""
+        """Open a PLY, a session or an edit, after asking about an edit that would be lost."""
         if path.suffix.lower() == ".json":
             self._read_edit(path)
-            return
-        self.leave_edit(lambda: self._session.open(path))
+        elif path.suffix.lower() == SUFFIX:
+            self.leave_edit(lambda: self._documents.open(path))
+        else:
+            self.leave_edit(lambda: self._session.open(path))
 
     def open_edit(self) -> None:
         """Ask for a recipe and make it the edit."""
@@ -74,7 +90,7 @@ class FileCommands:
     def export(self) -> None:
         """Ask where to, and write what is on screen."""
         scene = self._session.scene
-        suggested = _folder_of(scene.file.path) / f"{scene.file.path.stem}_edited.ply"
+        suggested = folder_to_write(scene.file.path) / f"{scene.file.path.stem}_edited.ply"
         dialog = ExportDialog(self._window, suggested, scene)
         dialog.accepted.connect(lambda: self._export(dialog))
         dialog.rejected.connect(self._forget_after_export)
@@ -87,7 +103,7 @@ class FileCommands:
     def save_edit(self) -> None:
         """Ask where to, and write the edit as a recipe."""
         source = self._session.scene.file.path
-        dialog = QFileDialog(self._window, "Save the edit", str(_folder_of(source) / f"{source.stem}_edit.json"))
+        dialog = QFileDialog(self._window, "Save the edit", str(folder_to_write(source) / f"{source.stem}_edit.json"))
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.setNameFilter(EDIT_FILTER)
         dialog.setDefaultSuffix("json")
@@ -112,26 +128,29 @@ class FileCommands:
     # ---------------------------------------------------------------- losing nothing
 
     def leave_edit(self, then: Callable[[], None]) -> None:
-        """Go on at once, or after the person has exported or let go of an edit that was not exported."""
-        if not self._session.has_unexported_edit:
+        """Go on at once, or after the person has saved, exported or let go of an edit that would be lost."""
+        if not self._documents.would_lose:
             then()
             return
         scene = self._session.scene
         box = QMessageBox(
             QMessageBox.Icon.NoIcon,
-            "Export the edit?",
-            f"The edit of {scene.file.path.name} has not been exported.",
+            "Save the edit?",
+            f"The edit of {scene.file.path.name} has not been saved.",
             parent=self._window,
         )
         box.setInformativeText("It is lost when another file is opened or the window is closed.")
         box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        export = box.addButton("Export…", QMessageBox.ButtonRole.AcceptRole)
+        save = box.addButton("Save" if self._documents.path else "Save…", QMessageBox.ButtonRole.AcceptRole)
+        export = box.addButton("Export PLY…", QMessageBox.ButtonRole.AcceptRole)
         discard = box.addButton("Discard", QMessageBox.ButtonRole.DestructiveRole)
         box.addButton("Cancel", QMessageBox.ButtonRole.RejectRole)
-        box.setDefaultButton(export)
+        box.setDefaultButton(save)
 
         def answered(button: object) -> None:
-            if button is export:
+            if button is save:
+                self._save_then(then)
+            elif button is export:
                 self._after_export = then
                 self.export()
             elif button is discard:
@@ -207,7 +226,7 @@ def _documents() -> str:
     return QStandardPaths.writableLocation(QStandardPaths.StandardLocation.DocumentsLocation)
 
 
-def _folder_of(source: Path) -> Path:
+def folder_to_write(source: Path) -> Path:
     """Folder to write to: the one used last, else the source's unless it is one of the program's own."""
     used = QSettings().value("files/folder", "", type=str)
     own = source.parent == sample_path().parent

@@ -1,6 +1,6 @@
 """One line for the background work: what, how far, Cancel; a sentence when it failed."""
 
-from PySide6.QtCore import QTimer
+from PySide6.QtCore import QTimer, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QPushButton, QWidget
 
 from splap_editor.session.jobs import Job
@@ -29,6 +29,9 @@ class JobBar(QWidget):
     A job in its stage fills the bar from the left; Cancel stops all
     background work, after which the line offers to resume.
     """
+
+    shown = Signal(bool)
+    """The line says something, or has fallen silent."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -102,10 +105,12 @@ class JobBar(QWidget):
         self._bar.setVisible(False)
         self._text.setVisible(True)
         self._button.setVisible(True)
+        self.shown.emit(True)
 
     def _hide(self) -> None:
         for part in (self._bar, self._text, self._button):
             part.setVisible(False)
+        self.shown.emit(False)
 
     def _on_clicked(self) -> None:
         if self._button.text() == "Cancel":

@@ -17,6 +17,8 @@ from PySide6.QtWidgets import (
 )
 
 import splap_editor
+from splap_editor.session.autosave import Autosave
+from splap_editor.session.documents import Documents
 from splap_editor.session.scene import Scene
 from splap_editor.session.session import Session
 from splap_editor.tools.select_tool import SelectTool
@@ -25,6 +27,7 @@ from splap_editor.ui.action_table import ACTIONS, MENUS
 from splap_editor.ui.actions import ActionSet
 from splap_editor.ui.commands import DisplayCommands, EditCommands, HandleCommands, SelectCommands, ToolCommands
 from splap_editor.ui.display import Display
+from splap_editor.ui.document_commands import DocumentCommands
 from splap_editor.ui.file_commands import FileCommands
 from splap_editor.ui.help_sheet import HelpSheet
 from splap_editor.ui.job_bar import JobBar
@@ -35,11 +38,13 @@ from splap_editor.ui.panels.handles_panel import HandlesPanel
 from splap_editor.ui.panels.scene_panel import ScenePanel
 from splap_editor.ui.panels.section import Section
 from splap_editor.ui.picture_dialog import PictureDialog
+from splap_editor.ui.recovery_bar import RecoveryBar
 from splap_editor.ui.state_line import StateLine
 from splap_editor.ui.toast import Toast
 from splap_editor.ui.tool_options import ToolOptionsBar
 from splap_editor.ui.view_commands import ViewCommands
 from splap_editor.ui.viewport_widget import ViewportWidget
+from splap_editor.ui.weight_legend import WeightLegend
 from splap_editor.viewport.scene_view import SceneView
 
 HINT = ("Click the surface to place a handle.", "Drag the arrows.")
@@ -67,6 +72,8 @@ class MainWindow(QMainWindow):
     Parameters
     ----------
     session : Session
+    documents : Documents
+    autosave : Autosave
     viewport : ViewportWidget
     view : SceneView
         What ``viewport`` shows.
@@ -78,6 +85,8 @@ class MainWindow(QMainWindow):
     def __init__(
         self,
         session: Session,
+        documents: Documents,
+        autosave: Autosave,
         viewport: ViewportWidget,
         view: SceneView,
         context: ToolContext,
@@ -89,9 +98,11 @@ class MainWindow(QMainWindow):
         self.setMinimumSize(900, 600)
         self.setAcceptDrops(True)
         self.session, self.viewport, self.view, self.tools, self.display = session, viewport, view, tools, display
+        self.documents, self.autosave = documents, autosave
         self._may_close = False
         self._has_hinted = QSettings().value("hint/done", False, type=bool)
         self.overlay = Overlay(context.hud, viewport)
+        self.weight_legend = WeightLegend(view.weights, viewport)
         self.toast = Toast(viewport)
         self.dock = QDockWidget()
         self.dock.setObjectName("panels")
@@ -105,6 +116,8 @@ class MainWindow(QMainWindow):
         self.statusBar().setSizeGripEnabled(False)
         self.statusBar().addWidget(self.job_bar, 1)
         self.statusBar().addPermanentWidget(self.state_line)
+        # In a narrow window there is room for one of the two.
+        self.job_bar.shown.connect(lambda on: self.state_line.hint.setVisible(not on))
         viewport.resized.connect(self._on_viewport_resized)
         viewport.compare_held.connect(display.hold_original)
         viewport.menu_wanted.connect(self._on_menu_wanted)
@@ -113,9 +126,12 @@ class MainWindow(QMainWindow):
         session.history.changed.connect(self._refresh)
         session.state_changed.connect(self._refresh)
         session.exported.connect(lambda report: self._refresh())
+        documents.changed.connect(self._refresh)
         session.job_changed.connect(lambda job: self._refresh())
         session.failed.connect(self._on_failed)
         self.deformer_panel.radius_hovered.connect(view.show_free_ring)
+        self.deformer_panel.weights.set_action(self.actions_["display.weights"])
+        self.handles_panel.cage_form.previewed.connect(view.weights.preview_cage)
         tools.chosen_changed.connect(self._show_tool)
         display.changed.connect(self._show_display)
         self._show_tool()
@@ -128,12 +144,16 @@ class MainWindow(QMainWindow):
     def _actions(self) -> ActionSet:
         session, view, tools = self.session, self.view, self.tools
         select_tool = next(tool for tool in tools.tools.values() if isinstance(tool, SelectTool))
-        self.files = FileCommands(self, session, self.toast)
+        saving = DocumentCommands(self, session, self.documents, self.autosave, view.viewport, self.display, self.toast)
+        self.document_commands = saving
+        self.files = FileCommands(self, session, self.documents, self.toast, saving.save_then)
+        self.recovery_bar = RecoveryBar(self.autosave, self.files.leave_edit)
         self.view_commands = ViewCommands(session, view, self, self.dock)
         return ActionSet(
             self,
             {
                 "file": self.files,
+                "document": saving,
                 "edit": EditCommands(session, tools),
                 "select": SelectCommands(session, select_tool),
                 "handle": HandleCommands(session, view.viewport),
@@ -158,6 +178,7 @@ class MainWindow(QMainWindow):
             elif spec.breaks:
                 menus[spec.menu].addSeparator()
             menus[spec.menu].addAction(self.actions_[spec.action_id])
+        menus["&File"].insertMenu(self.actions_["file.open_sample"], self.document_commands.recent)
 
     def _add_tool_column(self) -> None:
         column = QToolBar("Tools")
@@ -183,6 +204,7 @@ class MainWindow(QMainWindow):
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(0)
         layout.addWidget(ToolOptionsBar(self.tools, self.actions_))
+        layout.addWidget(self.recovery_bar)
         layout.addWidget(self.viewport, 1)
         self.setCentralWidget(centre)
 
@@ -233,8 +255,9 @@ class MainWindow(QMainWindow):
             self.actions_[f"edit.{name}"].setText(f"&{name.title()} {label.lower()}".rstrip())
         self.actions_.refresh()
         scene = self.session.scene
-        self.setWindowTitle(f"{scene.file.path.name}[*] – SpLap Editor" if scene is not None else "SpLap Editor")
-        self.setWindowModified(self.session.has_unexported_edit)
+        path = self.documents.path or (scene.file.path if scene is not None else None)
+        self.setWindowTitle(f"{path.name}[*] – SpLap Editor" if path is not None else "SpLap Editor")
+        self.setWindowModified(self.documents.would_lose)
 
     def _show_tool(self) -> None:
         chosen = self.tools.chosen
@@ -248,6 +271,7 @@ class MainWindow(QMainWindow):
         options = self.display.options
         self.actions_.check(f"display.{options.mode}")
         self.actions_.check(f"display.{options.shown}")
+        self.actions_.check("display.weights", options.weights)
         self.display.apply(self.view)
 
     def _on_scene_changed(self) -> None:
@@ -320,7 +344,7 @@ class MainWindow(QMainWindow):
         path = _dropped_path(event)
         if path is not None:
             event.acceptProposedAction()
-            what = "edit" if path.suffix.lower() == ".json" else "capture"
+            what = {".json": "edit", ".splap": "session"}.get(path.suffix.lower(), "capture")
             self.overlay.show_drop(f"Drop to open the {what} {path.name}")
 
     def dragLeaveEvent(self, event: QDragLeaveEvent) -> None:
@@ -339,7 +363,7 @@ class MainWindow(QMainWindow):
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Ask about an edit that would be lost; then stop the work and free the picture."""
-        if not self._may_close and self.session.has_unexported_edit:
+        if not self._may_close and self.documents.would_lose:
             event.ignore()
             self.files.leave_edit(self._close_for_good)
             return
@@ -349,6 +373,9 @@ class MainWindow(QMainWindow):
         settings.setValue("hint/done", self._has_hinted)
         self.display.save()
         self.tools.cancel()
+        self.recovery_bar.release()
+        self.autosave.close()
+        self.documents.close()
         self.session.close()
         self.view.close()
         self.viewport.close()
@@ -378,6 +405,8 @@ def _scene_meets(scene: Scene, condition: str) -> bool:
         return scene.surface is not None and bool(scene.selection.any())
     if condition == "hidden":
         return bool(scene.hidden.any())
+    if condition == "weights":
+        return scene.edit.method == "bbw" and bool(scene.edit.handles)
     if condition == "handles":
         return bool(scene.edit.handles)
     if condition == "pins":
@@ -389,4 +418,4 @@ def _scene_meets(scene: Scene, condition: str) -> bool:
 
 def _dropped_path(event: QDropEvent) -> Path | None:
     paths = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
-    return next((path for path in paths if path.suffix.lower() in (".ply", ".json")), None)
+    return next((path for path in paths if path.suffix.lower() in (".ply", ".splap", ".json")), None)

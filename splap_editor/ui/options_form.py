@@ -10,7 +10,6 @@ from PySide6.QtWidgets import QCheckBox, QComboBox, QGridLayout, QLabel, QWidget
 from splap_editor.ui.number_field import NumberField
 from splap_editor.ui.theme import STEP
 
-
 LABEL_PX = 84
 """All labels in front of fields are as wide, so that fields of several forms line up."""
 

@@ -11,6 +11,7 @@ from splap_editor.session.scene import Scene
 from splap_editor.session.session import Session
 from splap_editor.ui.number_field import NumberField, set_tone
 from splap_editor.ui.options_form import FieldHint, OptionsForm, form_label
+from splap_editor.ui.panels.weights_form import WeightsForm
 from splap_editor.ui.theme import STEP
 
 METHODS = {"arap": "As-rigid-as-possible", "bbw": "Bounded biharmonic weights"}
@@ -104,6 +105,7 @@ class DeformerPanel(QWidget):
                 blending=options.blending,
             )
         )
+        self.weights = WeightsForm(session)
         self.whole = QCheckBox(
             "Bend the whole object", toolTip="Otherwise only what lies within the free radius moves."
         )
@@ -126,6 +128,7 @@ class DeformerPanel(QWidget):
             layout.addWidget(part)
         layout.addLayout(reach)
         layout.addWidget(self.kernels)
+        layout.addWidget(self.weights)
         session.scene_changed.connect(self._on_scene_changed)
         session.state_changed.connect(self.show_state)
         self._show()
@@ -189,6 +192,7 @@ class DeformerPanel(QWidget):
         self.solver.show_value(edit.solver)
         self.kernels.show_value(_kernel_options(edit))
         self.kernels.show_field("blending", not is_arap)
+        self.weights.setVisible(not is_arap)
         self.whole.setVisible(is_arap)
         self.whole.setChecked(edit.free_radius is None)
         for part in (self.free_radius, self._radius_label):

@@ -20,6 +20,8 @@ from PySide6.QtWidgets import (
 from splap_editor.session.edit import Handle, Pose
 from splap_editor.session.scene import Scene
 from splap_editor.session.session import Session
+from splap_editor.session.weight_report import cage_radius
+from splap_editor.ui.panels.cage_form import CageForm
 from splap_editor.ui.panels.pose_form import PoseForm
 from splap_editor.ui.theme import STEP, icon
 
@@ -39,6 +41,8 @@ class HandlesPanel(QWidget):
         self.pose_form = PoseForm()
         self.pose_form.changed.connect(self._on_pose_changed)
         self.pose_form.previewed.connect(lambda pose: self._preview(pose))
+        self.cage_form = CageForm()
+        self.cage_form.changed.connect(self._on_cage_changed)
         self._pins = QLabel()
         self._pins.setProperty("tone", "quiet")
         self._clear_pins = QPushButton("Clear")
@@ -52,6 +56,7 @@ class HandlesPanel(QWidget):
         layout.addWidget(self._empty)
         layout.addLayout(self._list)
         layout.addWidget(self.pose_form)
+        layout.addWidget(self.cage_form)
         layout.addLayout(pins)
         session.scene_changed.connect(self._on_scene_changed)
         self._show()
@@ -88,6 +93,11 @@ class HandlesPanel(QWidget):
         self.pose_form.setVisible(handle is not None)
         if handle is not None:
             self.pose_form.show_pose(handle.pose, self._scene.ellipses.scene_scale)
+        has_cage = handle is not None and self._scene.edit.method == "bbw"
+        self.cage_form.setVisible(has_cage)
+        if has_cage:
+            radius = cage_radius(self._scene, handle.cage_radius)
+            self.cage_form.show_radius(radius, self._scene.ellipses.scene_scale)
 
     def _chosen(self) -> Handle | None:
         # The active ones may for a moment name a handle that an undo has just taken away.
@@ -134,6 +144,11 @@ class HandlesPanel(QWidget):
             self._session.commit_preview("Pose handle")
         else:
             self.change_handle(handle.handle_id, "Pose handle", pose=pose)
+
+    def _on_cage_changed(self, radius: float | None) -> None:
+        handle = self._chosen()
+        if handle is not None:
+            self.change_handle(handle.handle_id, "Change cage", cage_radius=radius)
 
 
 class HandleRow(QFrame):
