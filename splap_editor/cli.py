@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import math
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -145,7 +146,7 @@ def _deform(options: argparse.Namespace) -> int:
                     "n_changed": summary.n_changed,
                     "largest_displacement": summary.largest_displacement,
                     "largest_stretch": summary.largest_stretch,
-                    "residual": deformation.residual if deformation is not None else 0.0,
+                    "residual": _known(deformation.residual) if deformation is not None else 0.0,
                     "n_iterations": deformation.n_iterations if deformation is not None else 0,
                     "warnings": file.warnings,
                     "timings_s": report.timings_s,
@@ -225,6 +226,11 @@ def _readable(info: dict, indent: str = "") -> str:
         else:
             lines.append(f"{indent}{name}: {value:,}" if isinstance(value, int) else f"{indent}{name}: {value}")
     return "\n".join(lines)
+
+
+def _known(residual: float) -> float | None:
+    """JSON has no infinity, which stands for a residual that the solver does not estimate."""
+    return residual if math.isfinite(residual) else None
 
 
 def _sentence(error: BaseException) -> str:

@@ -219,3 +219,13 @@ def test_quantities_are_written_as_columns_on_request(tmp_path, recipe, capsys):
     assert main([*arguments, "--columns", "colour"]) == 2
     assert "there is no quantity 'colour'" in capsys.readouterr().err
     assert main([*arguments, "--columns", "geodesic"]) == 2
+
+
+@pytest.mark.parametrize("kind", ["local-global", "libigl"])
+def test_the_plain_solvers_run_and_own_up_to_an_unknown_residual(kind, tmp_path, recipe, capsys):
+    recipe.write_text(json.dumps({**json.loads(recipe.read_text()), "solver": {"kind": kind, "iterations": 3}}))
+    out = tmp_path / "out.ply"
+    assert main(["deform", str(TUBE), "--recipe", str(recipe), "-o", str(out), "--json"]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["residual"] is None and summary["n_iterations"] == 3
+    assert summary["n_changed"] > 0
