@@ -86,9 +86,11 @@ def _solved(surface, handles, options, progress, stages, n_threads):
     with ThreadPoolExecutor(n_threads, thread_name_prefix="splap-bbw") as threads:
         futures = [threads.submit(handle_weight, problem, h, of_handle(h)) for h in range(handles.n_handles)]
         try:
-            while wait(futures, timeout=REPORT_SECONDS).not_done:
+            is_under_way = bool(futures)
+            while is_under_way:
                 told = progress if stages is None else stages(_words(shares, [future.done() for future in futures]))
                 told(0.1 + 0.9 * float(shares.mean()))
+                is_under_way = bool(wait(futures, timeout=REPORT_SECONDS).not_done)
         except Cancelled:
             is_cancelled = True
             raise

@@ -3,22 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-BAND_COLORS = np.array(
-    [
-        (68, 1, 84),
-        (72, 40, 120),
-        (62, 74, 137),
-        (49, 104, 142),
-        (38, 130, 142),
-        (31, 158, 137),
-        (53, 183, 121),
-        (110, 206, 88),
-        (181, 222, 43),
-        (253, 231, 37),
-    ],
-    np.uint8,
-)
-"""Ten steps of viridis: lightness rises evenly, for the colour-blind too."""
+from splap_editor.viewport.colormaps import COLORMAPS
+
+BAND_COLORS = COLORMAPS["viridis"][np.rint(np.linspace(0, 255, 10)).astype(np.intp)]
+"""One for each tenth of a weight."""
 
 REST_COLOR = (58, 60, 66)
 """Where the handle has no say."""
@@ -26,15 +14,13 @@ REST_COLOR = (58, 60, 66)
 _SHARE = 236
 
 
-def weight_tints(weights: NDArray[np.float64], *, n_bands: int = len(BAND_COLORS)) -> NDArray[np.uint8]:
+def weight_tints(weights: NDArray[np.float64]) -> NDArray[np.uint8]:
     """Tint splats by a weight, one colour for each tenth.
 
     Parameters
     ----------
     weights : (N,) float64
         Weights in 0..1; NaN and 0 are where the handle has no say.
-    n_bands : int
-        Number of steps, at most the colours there are.
 
     Returns
     -------
@@ -45,7 +31,6 @@ def weight_tints(weights: NDArray[np.float64], *, n_bands: int = len(BAND_COLORS
     tints[:, :3] = REST_COLOR
     tints[:, 3] = _SHARE
     felt = np.flatnonzero(weights > 0)
-    bands = np.minimum((weights[felt] * n_bands).astype(np.int64), n_bands - 1)
-    colors = BAND_COLORS[np.rint(np.linspace(0, len(BAND_COLORS) - 1, n_bands)).astype(np.int64)]
-    tints[felt, :3] = colors[bands]
+    n_bands = len(BAND_COLORS)
+    tints[felt, :3] = BAND_COLORS[np.minimum((weights[felt] * n_bands).astype(np.intp), n_bands - 1)]
     return tints
