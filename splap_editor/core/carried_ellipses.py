@@ -187,8 +187,11 @@ def write_kernels(carriers, weights, motions, moved, rotations, rest, out):
         for lane in range(count):
             i = lo + lane
             any_moved = False
-            for k in range(9):
-                any_moved |= weights[i, k] > 0.0 and moved[carriers[i, k]]
+            for c in range(3):
+                any_moved |= moved[carriers[i, 3 * c]]
+                any_moved |= weights[i, 2 * c] < 1.0 and (
+                    moved[carriers[i, 3 * c + 1]] or moved[carriers[i, 3 * c + 2]]
+                )
             changed[i] = any_moved
             if any_moved:
                 _carry_triangle(i, lane, carriers, weights, motions, rotations, ellipses, lanes)
@@ -224,8 +227,10 @@ def _carry_triangle(i, lane, carriers, weights, motions, rotations, ellipses, la
         py = ellipses[i, 1] + along * ellipses[i, 4] + across * ellipses[i, 7]
         pz = ellipses[i, 2] + along * ellipses[i, 5] + across * ellipses[i, 8]
         x = y = z = 0.0
-        for k in range(3 * c, 3 * c + 3):
-            j, w = carriers[i, k], weights[i, k]
+        w0, w1 = np.float64(weights[i, 2 * c]), np.float64(weights[i, 2 * c + 1])
+        for k in range(3):
+            j = carriers[i, 3 * c + k]
+            w = w0 if k == 0 else (w1 if k == 1 else 1.0 - w0 - w1)
             x += w * (motions[j, 0] * px + motions[j, 3] * py + motions[j, 6] * pz + motions[j, 9])
             y += w * (motions[j, 1] * px + motions[j, 4] * py + motions[j, 7] * pz + motions[j, 10])
             z += w * (motions[j, 2] * px + motions[j, 5] * py + motions[j, 8] * pz + motions[j, 11])

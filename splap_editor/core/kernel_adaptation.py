@@ -193,7 +193,7 @@ def adapt_kernels(
             find_ring_motions(hops, binding.graph.indptr, binding.graph.indices, *nodes, motions)
             # Each splat carries itself.
             carriers = np.repeat(np.arange(len(positions), dtype=np.int32)[:, None], 9, axis=1)
-            weights = np.tile([1.0, 0.0, 0.0], (len(positions), 3))
+            weights = np.tile(np.array([1.0, 0.0], np.float32), (len(positions), 3))
         write_kernels(carriers, weights, motions, moved, rotations, rest, arrays)
         binding.spare_motions.append(motions)
     adapt_inert(binding.inert_carriers, binding.inert_weights, rest, positions, rotations, moved, arrays)

@@ -99,9 +99,10 @@ class KernelBinding:
         self.splats = splats
         self.ellipses = ellipses
         self.graph = graph
-        # (n, 9) node indices and weights, three per corner; the weights of a corner sum to 1.
+        # (n, 9) nodes, three per corner, and (n, 6) the weights of the first two; the third has what is left of 1.
+        # Single precision, since a drag waits for them to come from memory; their sum is exact all the same.
         self.carriers = np.empty((n, 9), np.int32)
-        self.weights = np.empty((n, 9))
+        self.weights = np.empty((n, 6), np.float32)
         # (n, 6) neighbours, padded with the node itself; (n, 6) upper triangle of the inverse of their damped
         # second moments; (n,) the damping in units of length², 0 where they hold no shape.
         self.stencils = np.empty((n, STENCIL_SIZE), np.int32)
@@ -212,14 +213,11 @@ def _find_carriers(lo, hi, centers, semi_axes, indptr, indices, carriers, weight
                 nearest[slot] = j
             # A carrier on the corner itself carries it alone.
             alone = squares[0] <= 1e-24 * reach
-            total = 0.0
+            total = 1.0 if alone else 1.0 + np.sqrt(squares[0] / squares[1]) + np.sqrt(squares[0] / squares[2])
             for slot in range(3):
-                weight = (1.0 if slot == 0 else 0.0) if alone else np.sqrt(squares[0] / squares[slot])
                 carriers[i, 3 * corner + slot] = nearest[slot]
-                weights[i, 3 * corner + slot] = weight
-                total += weight
-            for slot in range(3):
-                weights[i, 3 * corner + slot] /= total
+            weights[i, 2 * corner] = 1.0 / total
+            weights[i, 2 * corner + 1] = 0.0 if alone else np.sqrt(squares[0] / squares[1]) / total
 
 
 @nb.njit(nogil=True, cache=True)
