@@ -13,7 +13,9 @@ from PySide6.QtCore import QCoreApplication, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QSurfaceFormat
 from PySide6.QtWidgets import QApplication
 
+from splap_editor.session.autosave import Autosave
 from splap_editor.session.cache import StageCache
+from splap_editor.session.documents import Documents
 from splap_editor.session.jobs import Job
 from splap_editor.session.session import Session
 from splap_editor.tools.axes_tool import AxesTool
@@ -68,6 +70,7 @@ def run(path: Path | None = None) -> int:
     window = make_window()
     sys.excepthook = _shows_in(window)
     window.show()
+    window.recovery_bar.look()
     QTimer.singleShot(0, lambda: _open_first(window, path or sample_path()))
     return app.exec()
 
@@ -80,6 +83,8 @@ def make_window(cache: StageCache | None = None) -> MainWindow:
     scale = widget.devicePixelRatioF()
     viewport = Viewport(widget.render_window, widget.update, renderer=widget.renderer, scale=scale)
     view = SceneView(session, viewport)
+    documents = Documents(session, mailbox.post)
+    autosave = Autosave(documents, mailbox.post)
     context = ToolContext(session, viewport)
     context.navigate = NavigateTool(context)
     axes = AxesTool(context)
@@ -94,7 +99,7 @@ def make_window(cache: StageCache | None = None) -> MainWindow:
         context.navigate,
     )
     widget.connect_tools(tools.pointer, tools.key)
-    window = MainWindow(session, widget, view, context, tools, Display())
+    window = MainWindow(session, documents, autosave, widget, view, context, tools, Display())
     axes.fly_to = window.view_commands.fly_to
     mailbox.setParent(window)
     return window
@@ -104,7 +109,7 @@ def _open_first(window: MainWindow, path: Path) -> None:
     """Open the first file; on the very first start when the loops are compiled, which would freeze the window here."""
     session = window.session
     if is_warm():
-        session.open(path)
+        window.files.open_path(path)
         session.view_worker.submit(Job("load", "", lambda job: load_view_loops()))
         return
 
@@ -120,7 +125,7 @@ def _open_first(window: MainWindow, path: Path) -> None:
                 process.wait()
 
     def go_on(*_: object) -> None:
-        session.open(path)
+        window.files.open_path(path)
 
     session.worker.submit(Job("warm", "Getting ready for this computer", compile_elsewhere, go_on, go_on, go_on))
 

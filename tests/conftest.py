@@ -28,9 +28,10 @@ def fixed_seeds() -> None:
 
 @pytest.fixture(autouse=True)
 def own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Point the stage cache at an empty folder, so that no test sees another's or the user's."""
+    """Point stage cache and recovery files at an empty folder, so that no test sees another's or the user's."""
     folder = tmp_path_factory.mktemp("cache")
     monkeypatch.setenv("SPLAP_CACHE_DIR", str(folder))
+    monkeypatch.setenv("SPLAP_STATE_DIR", str(folder / "state"))
     return folder
 
 

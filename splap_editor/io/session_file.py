@@ -241,7 +241,7 @@ def _timeline_json(timeline: TimelineSpec) -> dict[str, Any]:
     }
 
 
-_VIEW_KEYS = ("position", "focal_point", "view_up", "angle", "parallel", "turntable")
+_VIEW_KEYS = ("position", "focal_point", "view_up", "angle", "parallel", "turntable", "world_up")
 
 
 def _view(view: JsonObject) -> ViewSpec:
@@ -257,7 +257,11 @@ def _view(view: JsonObject) -> ViewSpec:
     angle = view.number("angle", ViewSpec.angle, above=0.0)
     if angle >= 180.0:
         raise view.refuse("angle", "below 180 degrees")
-    return ViewSpec(position, focal_point, up, angle, view.flag("parallel", False), view.flag("turntable", True))
+    world_up = view.vector("world_up", 3, ViewSpec.world_up)
+    if not 0.0 < math.hypot(*world_up) < math.inf:
+        raise view.refuse("world_up", "a vector that is not zero")
+    is_parallel, is_turntable = view.flag("parallel", False), view.flag("turntable", True)
+    return ViewSpec(position, focal_point, up, angle, is_parallel, is_turntable, world_up)
 
 
 def _view_json(view: ViewSpec) -> dict[str, Any]:
@@ -267,6 +271,7 @@ def _view_json(view: ViewSpec) -> dict[str, Any]:
         "angle": view.angle,
         "parallel": view.is_parallel,
         "turntable": view.is_turntable,
+        "world_up": list(view.world_up),
     }
 
 

@@ -63,7 +63,7 @@ class TimelineSpec:
 
 @dataclass(frozen=True)
 class ViewSpec:
-    """Where the camera stands: the fields of `splap_editor.viewport.camera.View`, and its turntable."""
+    """Where the camera stands: the fields of `splap_editor.viewport.camera.View`, and its turntable's axis."""
 
     position: Vector
     focal_point: Vector
@@ -71,6 +71,7 @@ class ViewSpec:
     angle: float = 35.0
     is_parallel: bool = False
     is_turntable: bool = True
+    world_up: Vector = (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -58,9 +58,9 @@ class Autosave:
         """Edits that other processes left behind when they died, the newest first."""
         return orphans(self._folder)
 
-    def restore(self, orphan: Orphan, *, ply: Path | None = None) -> None:
+    def restore(self, orphan: Orphan) -> None:
         """Bring an edit back; its file becomes the recovery file of this process once it is on screen."""
-        self._documents.recover(orphan.session, lambda: self._adopt(orphan.slot), ply=ply)
+        self._documents.recover(orphan.session, lambda: self._adopt(orphan.slot))
 
     def close(self) -> None:
         """End cleanly: nothing is left to recover."""

@@ -22,14 +22,20 @@ class MissingPlyError(ValueError):
     document : Path or None
         The session file; None for a recovery file.
     session : SessionFile
+
+    Attributes
+    ----------
+    open_with : callable
+        ``open_with(path)`` opens the session with the PLY found elsewhere.
     """
 
     def __init__(self, document: Path | None, session: SessionFile) -> None:
-        name = Path(session.ply.path).name
+        self.name = Path(session.ply.path).name
         where = document.name if document is not None else "the recovered edit"
-        super().__init__(f"{name} is not where {where} says ({session.ply.path}); find it, or put it back")
+        super().__init__(f"{self.name} is not where {where} says ({session.ply.path}); find it, or put it back")
         self.document = document
         self.session = session
+        self.open_with: Callable[[Path], None] = lambda ply: None
 
 
 @dataclass(eq=False)
@@ -107,28 +113,25 @@ class Documents:
 
     # ---------------------------------------------------------------- open
 
-    def open(self, path: Path, *, ply: Path | None = None) -> None:
-        """Open a session file and the PLY it belongs to, or another one given in its place."""
+    def open(self, path: Path) -> None:
+        """Open a session file and the PLY it belongs to."""
 
         def read(job: Job) -> _Arrival:
             session = read_session_file(path)
             return _Arrival(session, path, False, [], lambda: None)
 
-        self._open(f"Opening {path.name}", read, path.parent, ply)
+        self._open(f"Opening {path.name}", read, path.parent)
 
-    def recover(
-        self, session: SessionFile, arrived: Callable[[], None] = lambda: None, *, ply: Path | None = None
-    ) -> None:
+    def recover(self, session: SessionFile, arrived: Callable[[], None] = lambda: None) -> None:
         """Open the edit of a recovery file; it counts as not saved. ``arrived`` is called once it is on screen."""
         document = Path(session.document) if session.document else None
         self._open(
             "Restoring the edit",
             lambda job: _Arrival(session, document, True, [], arrived),
             document.parent if document is not None else Path(),
-            ply,
         )
 
-    def _open(self, title: str, read: Callable[[Job], _Arrival], folder: Path, ply: Path | None) -> None:
+    def _open(self, title: str, read: Callable[[Job], _Arrival], folder: Path, ply: Path | None = None) -> None:
         def located(job: Job) -> tuple[_Arrival, Path]:
             arrival = read(job)
             return arrival, _located(arrival, folder, ply)
@@ -143,7 +146,12 @@ class Documents:
             self._arrival = arrival
             self._session.open(source, layout=arrival.session.ply.layout, restore=restore)
 
-        job = Job("open", title, located, done, failed=lambda error: self.failed.emit(title, error))
+        def failed(error: Exception) -> None:
+            if isinstance(error, MissingPlyError):
+                error.open_with = lambda found: self._open(title, read, folder, found)
+            self.failed.emit(title, error)
+
+        job = Job("open", title, located, done, failed)
         self.worker.submit(job, cancels=("open",))
 
     def _on_scene_changed(self) -> None:

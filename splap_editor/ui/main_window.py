@@ -30,6 +30,7 @@ from splap_editor.ui.display import Display
 from splap_editor.ui.document_commands import DocumentCommands
 from splap_editor.ui.file_commands import FileCommands
 from splap_editor.ui.help_sheet import HelpSheet
+from splap_editor.ui.inspection import Inspection
 from splap_editor.ui.job_bar import JobBar
 from splap_editor.ui.overlay import Overlay
 from splap_editor.ui.panels.deformer_panel import DeformerPanel
@@ -103,6 +104,7 @@ class MainWindow(QMainWindow):
         self._has_hinted = QSettings().value("hint/done", False, type=bool)
         self.overlay = Overlay(context.hud, viewport)
         self.weight_legend = WeightLegend(view.weights, viewport)
+        self.inspection = Inspection(session, view, context, tools, viewport)
         self.toast = Toast(viewport)
         self.dock = QDockWidget()
         self.dock.setObjectName("panels")
@@ -115,6 +117,7 @@ class MainWindow(QMainWindow):
         self.state_line = StateLine(session, tools)
         self.statusBar().setSizeGripEnabled(False)
         self.statusBar().addWidget(self.job_bar, 1)
+        self.statusBar().addPermanentWidget(self.inspection.read_out)
         self.statusBar().addPermanentWidget(self.state_line)
         # In a narrow window there is room for one of the two.
         self.job_bar.shown.connect(lambda on: self.state_line.hint.setVisible(not on))
@@ -221,6 +224,7 @@ class MainWindow(QMainWindow):
             ("Handles", self.handles_panel),
             ("Deformer", self.deformer_panel),
             ("Display", self.display_panel),
+            *self.inspection.panels,
             ("Scene", self.scene_panel),
         ):
             stack.addWidget(Section(title, panel))

@@ -53,9 +53,9 @@ class Desk:
         self.session.open(self.ply)
         self.main.run_until(lambda: self.scene is not before)
 
-    def open(self, path, **options):
+    def open(self, path):
         n = len(self.opened) + len(self.failures)
-        self.documents.open(path, **options)
+        self.documents.open(path)
         self.main.run_until(lambda: len(self.opened) + len(self.failures) > n)
 
     def save(self, path=None):
@@ -171,7 +171,8 @@ def test_a_missing_ply_is_said_and_can_be_located(desk, tmp_path):
     (error,) = desk.failures
     assert isinstance(error, MissingPlyError) and error.document == path and "tube.ply" in str(error)
     assert desk.scene is before
-    desk.open(path, ply=moved)
+    error.open_with(moved)
+    desk.main.run_until(lambda: len(desk.opened) == 1)
     assert_same_edit(desk.scene.edit, edit)
     assert desk.opened[-1][1] == []
     desk.save()
