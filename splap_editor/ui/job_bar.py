@@ -62,9 +62,8 @@ class JobBar(QWidget):
         return self._text.text() if self._text.isVisibleTo(self) else ""
 
     def _on_job_changed(self, job: Job | None) -> None:
-        if job is None or not job.title:
-            self._job = None
-            self._delay.stop()
+        if job is None or not job.title or job.is_cancelled:
+            self._forget_job()
             self._on_state_changed()
         else:
             is_new = job is not self._job
@@ -75,14 +74,18 @@ class JobBar(QWidget):
                 self._delay.start()
 
     def _on_state_changed(self) -> None:
-        if self._job is not None:
-            return
         if self._session.state == "halted":
+            self._forget_job()
             self._say("Background work stopped.", "Resume")
         elif self._session.state == "failed":
+            self._forget_job()
             self._say("The last step failed; the edit is kept.", "Try again")
-        else:
+        elif self._job is None:
             self._hide()
+
+    def _forget_job(self) -> None:
+        self._job = None
+        self._delay.stop()
 
     def _show(self) -> None:
         job = self._job
@@ -114,7 +117,6 @@ class JobBar(QWidget):
 
     def _on_clicked(self) -> None:
         if self._button.text() == "Cancel":
-            self._job = None
             self._session.halt()
         else:
             self._session.resume()
