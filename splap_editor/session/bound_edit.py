@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from splap_editor.core.deformer import Deformer, Handles
 from splap_editor.session.edit import Edit
-from splap_editor.session.quantities import Snapshot
+from splap_editor.session.quantities import QUANTITIES, Snapshot, missing
 from splap_editor.session.scene import Scene
 
 
@@ -38,3 +38,12 @@ def snapshot_of(scene: Scene, bound: BoundEdit | None) -> Snapshot:
         handle,
         scene.picked,
     )
+
+
+def column_lacks(scene: Scene, bound: BoundEdit | None) -> dict[str, str]:
+    """What each quantity lacks to become a column of the exported file, by name; empty where it can."""
+    snapshot, taken = snapshot_of(scene, bound), scene.file.table.columns
+    return {
+        name: "another name: the file has such a column" if name in taken else missing(quantity, snapshot)
+        for name, quantity in QUANTITIES.items()
+    }

@@ -70,6 +70,8 @@ class Quantity:
         Attribute of `Snapshot` without which there are no values; empty: none.
     labels : tuple of str, optional
         Words for the values 0, 1 …; empty for numbers.
+    is_whole : bool
+        The values are whole numbers.
     is_label : bool
         The values are names, not amounts: they have colours of their own rather than a place on a scale.
     middle : float, optional
@@ -82,6 +84,7 @@ class Quantity:
     values: Callable[[Snapshot], NDArray[np.float64]]
     needs: str = ""
     labels: tuple[str, ...] = ()
+    is_whole: bool = False
     is_label: bool = False
     middle: float | None = None
 
@@ -229,14 +232,14 @@ QUANTITIES: dict[str, Quantity] = {
         Quantity("alpha", "Opacity", "", opacity),
         Quantity("size", "Size", "length", size),
         Quantity("flatness", "Flatness", "", flatness),
-        Quantity("degree", "Degree", "", degree, "surface"),
-        Quantity("component", "Component", "", component, "surface", is_label=True),
+        Quantity("degree", "Degree", "", degree, "surface", is_whole=True),
+        Quantity("component", "Component", "", component, "surface", is_whole=True, is_label=True),
         Quantity("geodesic", "Distance along the surface", "length", geodesic_distance, "picked"),
         Quantity("displacement", "Displacement", "length", displacement),
         Quantity("stretch", "Largest stretch", "×", stretch, middle=1.0),
         Quantity("least_stretch", "Smallest stretch", "×", least_stretch, middle=1.0),
         Quantity("rotation", "Rotation", "°", rotation_angle),
-        Quantity("free", "Free or fixed", "", free, "handles", ("fixed", "held", "free"), is_label=True),
+        Quantity("free", "Free or fixed", "", free, "handles", ("fixed", "held", "free"), is_whole=True, is_label=True),
         Quantity("weight", "Weight of the handle", "", handle_weight, "weights"),
     )
 }

@@ -161,6 +161,10 @@ class ToolManager:
             self._chosen = name
             self.chosen_changed.emit()
 
+    def stand(self, tool: Tool) -> None:
+        """Ask another tool before all others."""
+        self._standing = (tool, *self._standing)
+
     def cancel(self) -> None:
         """Cancel what is under way in every tool."""
         self._holder = None

@@ -1,6 +1,7 @@
 """Where to export to, and in which form."""
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 
 from PySide6.QtCore import Qt
@@ -18,6 +19,7 @@ from PySide6.QtWidgets import (
 )
 
 from splap_editor.session.scene import Scene
+from splap_editor.ui.columns_list import ColumnsList
 from splap_editor.ui.number_field import set_tone
 from splap_editor.ui.theme import STEP
 
@@ -25,7 +27,7 @@ from splap_editor.ui.theme import STEP
 class ExportDialog(QDialog):
     """Asks for a path; says before anything is written what stands in the way."""
 
-    def __init__(self, parent: QWidget, suggested: Path, scene: Scene) -> None:
+    def __init__(self, parent: QWidget, suggested: Path, scene: Scene, lacks: Mapping[str, str]) -> None:
         super().__init__(parent)
         self.setWindowTitle("Export PLY")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
@@ -46,6 +48,7 @@ class ExportDialog(QDialog):
         self.note = QLabel(wordWrap=True)
         self.third_scale = QCheckBox("Add a thin third scale, for viewers that only know 3DGS")
         self.third_scale.setVisible(scene.splats.n_scales == 2)
+        self.columns = ColumnsList(lacks)
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
         self.accept_button = buttons.addButton("Export", QDialogButtonBox.ButtonRole.AcceptRole)
         self.accept_button.setDefault(True)
@@ -57,6 +60,7 @@ class ExportDialog(QDialog):
         layout.addWidget(facts)
         layout.addLayout(line)
         layout.addWidget(self.third_scale)
+        layout.addWidget(self.columns)
         layout.addWidget(self.note)
         layout.addStretch(1)
         layout.addWidget(buttons)

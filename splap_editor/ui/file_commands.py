@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QFileDialog, QMessageBox, QWidget
 from splap_editor.io.session_file import SUFFIX
 from splap_editor.resources import resource
 from splap_editor.session.documents import Documents
+from splap_editor.session.bound_edit import column_lacks
 from splap_editor.session.export_report import ExportReport
 from splap_editor.session.session import Session
 from splap_editor.ui.export_dialog import ExportDialog
@@ -91,14 +92,14 @@ class FileCommands:
         """Ask where to, and write what is on screen."""
         scene = self._session.scene
         suggested = folder_to_write(scene.file.path) / f"{scene.file.path.stem}_edited.ply"
-        dialog = ExportDialog(self._window, suggested, scene)
+        dialog = ExportDialog(self._window, suggested, scene, column_lacks(scene, self._session.bound))
         dialog.accepted.connect(lambda: self._export(dialog))
         dialog.rejected.connect(self._forget_after_export)
         dialog.open()
 
     def _export(self, dialog: ExportDialog) -> None:
         QSettings().setValue("files/folder", str(dialog.path.parent))
-        self._session.export(dialog.path, as_3dgs=dialog.as_3dgs)
+        self._session.export(dialog.path, as_3dgs=dialog.as_3dgs, columns=dialog.columns.names)
 
     def save_edit(self) -> None:
         """Ask where to, and write the edit as a recipe."""
