@@ -7,17 +7,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.carried_ellipses import (
-    STILL_SHARE,
-    KernelArrays,
-    adapt_inert,
-    find_motions,
-    find_moved,
-    find_ring_motions,
-    write_kernels,
-)
+from splap_editor.core.carried_ellipses import KernelArrays, adapt_inert, write_kernels
 from splap_editor.core.deformer import Deformation
 from splap_editor.core.kernel_binding import KernelBinding
+from splap_editor.core.node_motions import STILL_SHARE, find_motions, find_moved, find_ring_motions
 from splap_editor.core.rotations import matrices_to_quats, quat_products
 from splap_editor.core.spherical_harmonics import rotated_sh
 from splap_editor.core.splats import Splats
