@@ -1,0 +1,133 @@
+"""Makes the pictures of the README by driving the real window, as a person would.
+
+::
+
+    xvfb-run -s "-screen 0 1600x1000x24" python tests/pictures.py
+"""
+
+import os
+import sys
+from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("QT_API", "pyside6")
+REPOSITORY = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(REPOSITORY))
+
+import numpy as np
+from PySide6.QtCore import QCoreApplication, QEventLoop, QPoint, QPointF, QSettings, Qt, QTimer
+from PySide6.QtGui import QSurfaceFormat
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
+
+from splap_editor.app import make_window
+from splap_editor.resources import resource
+from splap_editor.ui.theme import apply_theme
+from splap_editor.ui.viewport_widget import surface_format
+
+PICTURES = REPOSITORY / "resources" / "pictures"
+SIZE = (1280, 800)
+SAIL_TIP = np.array([-0.45, -0.40, 1.16])
+
+
+def run_for(milliseconds: int) -> None:
+    """Let the window live for a while."""
+    loop = QEventLoop()
+    QTimer.singleShot(milliseconds, loop.quit)
+    loop.exec()
+
+
+def run_until(condition) -> None:
+    """Let the window live until something holds."""
+    for _ in range(3000):
+        if condition():
+            return
+        run_for(40)
+    raise TimeoutError("the window did not get there")
+
+
+class Person:
+    """Points, clicks and drags in one window."""
+
+    def __init__(self, window) -> None:
+        self.window = window
+        self.session = window.session
+
+    def pixel(self, point: np.ndarray) -> QPoint:
+        """Where a world point is in the viewport."""
+        x, y = self.window.view.viewport.projection.pixel(point) / self.window.viewport.devicePixelRatioF()
+        return QPoint(round(x), round(y))
+
+    def click(self, at: QPoint) -> None:
+        """Move there, pause, click."""
+        QTest.mouseMove(self.window.viewport, at)
+        run_for(300)
+        QTest.mouseClick(self.window.viewport, Qt.MouseButton.LeftButton, pos=at)
+        run_for(300)
+
+    def drag(self, start: QPoint, end: QPoint, *, let_go: bool = True, steps: int = 24) -> None:
+        """Press, move in steps, and let go or hold."""
+        QTest.mouseMove(self.window.viewport, start)
+        run_for(200)
+        QTest.mousePress(self.window.viewport, Qt.MouseButton.LeftButton, pos=start)
+        for step in range(1, steps + 1):
+            at = QPointF(start) + (QPointF(end) - QPointF(start)) * (step / steps)
+            QTest.mouseMove(self.window.viewport, at.toPoint())
+            run_for(60)
+        if let_go:
+            QTest.mouseRelease(self.window.viewport, Qt.MouseButton.LeftButton, pos=end)
+
+    def settle(self) -> None:
+        """Wait until nothing moves any more."""
+        run_until(lambda: self.session.state in ("ready", "settled"))
+        run_for(1200)
+
+    def picture(self, name: str, *, only_view: bool = False) -> None:
+        """Write what is on the screen."""
+        run_for(800)
+        shot = QApplication.primaryScreen().grabWindow(self.window.winId())
+        if only_view:
+            corner = self.window.viewport.mapTo(self.window, QPoint(0, 0))
+            shot = shot.copy(corner.x(), corner.y(), self.window.viewport.width(), self.window.viewport.height())
+        PICTURES.mkdir(parents=True, exist_ok=True)
+        shot.save(str(PICTURES / f"{name}.png"))
+
+
+def main() -> None:
+    """Make every picture."""
+    QSurfaceFormat.setDefaultFormat(surface_format())
+    app = QApplication(sys.argv[:1])
+    QCoreApplication.setOrganizationName("splap-editor-pictures")
+    QSettings.setDefaultFormat(QSettings.Format.IniFormat)
+    QSettings.setPath(QSettings.Format.IniFormat, QSettings.Scope.UserScope, os.devnull)
+    apply_theme(app)
+    window = make_window()
+    window.resize(*SIZE)
+    window.show()
+    person = Person(window)
+    person.session.open(resource("samples", "windmill_2dgs.ply"))
+    run_until(lambda: person.session.scene is not None)
+    person.settle()
+
+    person.click(person.pixel(SAIL_TIP))
+    person.settle()
+    handle = person.session.scene.edit.active_handles[0]
+    center = np.asarray(handle.region.center)
+    gizmo = window.view.viewport.gizmo
+    arm = gizmo.arm_length(window.view.viewport.projection)
+    grip = person.pixel(center + np.array([0.0, 0.0, 0.8 * arm]))
+    person.drag(grip, grip + QPoint(0, 80))
+    person.settle()
+    arm = gizmo.arm_length(window.view.viewport.projection)
+    grip = person.pixel(gizmo.frame[:3, 3] + np.array([0.8 * arm, 0.0, 0.0]))
+    person.drag(grip, grip + QPoint(-110, 22), let_go=False)
+    person.picture("drag", only_view=True)
+    QTest.mouseRelease(window.viewport, Qt.MouseButton.LeftButton, pos=grip + QPoint(-110, 22))
+    person.settle()
+    person.picture("window")
+    sys.stdout.flush()
+    os._exit(0)  # Qt and VTK tear down in no promised order; the pictures are written
+
+
+if __name__ == "__main__":
+    main()
