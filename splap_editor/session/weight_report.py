@@ -66,13 +66,12 @@ def weight_lines(edit: Edit, report: BbwReport) -> list[tuple[str, str]]:
                 )
             )
             continue
-        solver = "interior-point solver, the active set did not settle" if qp.fallback else "active set"
         n = qp.n_factorisations
         lines.append(
             (
-                f"{handle.name}: {report.n_unknowns[index]:,} splats weighed, {n} factorisation{'s' if n != 1 else ''} "
-                f"({solver}); a weight is off by about {qp.kkt_residual:.0e} (KKT residual), "
-                f"{qp.bound_violation:.0e} past its bounds before it was set on them.",
+                f"{handle.name}: {report.n_unknowns[index]:,} splats, {n} factorisation{'s' if n != 1 else ''}, "
+                f"KKT residual {qp.kkt_residual:.0e}, bounds met to {qp.bound_violation:.0e}"
+                + (", by the interior-point fallback since the active set did not settle." if qp.fallback else "."),
                 "warning" if qp.fallback or qp.kkt_residual > KKT_WARNING else "quiet",
             )
         )

@@ -13,7 +13,10 @@ from splap_editor.viewport.overlays import Rings
 from splap_editor.viewport.projection import Projection
 
 _NAME = "cage"
-_GRID = 72
+_GRID = 96
+# Balls whose centres are nearer to each other than this share of the radius look like one.
+_FINENESS = 32
+_MOST_POINTS = 3000
 _TURN_COS = np.cos(np.radians(2.0))
 
 
@@ -46,7 +49,11 @@ class CageOutline:
 
     def show(self, points: ArrayLike, radius: float, color: tuple[float, float, float]) -> None:
         """Outline what lies within ``radius`` of the world points (K, 3), from the next frame on."""
-        self._points = thinned(np.asarray(points, np.float64).reshape(-1, 3), radius / 8)
+        points, spacing = np.asarray(points, np.float64).reshape(-1, 3), radius / _FINENESS
+        self._points = thinned(points, spacing)
+        while len(self._points) > _MOST_POINTS:
+            spacing *= 1.5
+            self._points = thinned(points, spacing)
         self._radius, self._color = float(radius), color
         self._direction = None
 

@@ -321,3 +321,56 @@ def test_closing_while_a_job_runs_ends_cleanly(main, session, monkeypatch):
     main.run_until(started.is_set)
     session.close()
     assert not any(thread.name.startswith("splap") for thread in threading.enumerate())
+
+
+def weighed(main, session):
+    """Two handles with bounded biharmonic weights."""
+    scene = session.scene
+    session.change_edit(replace(scene.edit, method="bbw"), "Change method")
+    for sign in (-1, 1):
+        session.add_handle(rows_region(scene, end_rows(scene, sign)))
+    main.run_until(lambda: session.state == "settled")
+
+
+def test_weights_found_before_are_not_solved_for_again(main, opened, monkeypatch):
+    weighed(main, opened)
+    kept = opened.bound.deformer
+
+    def refuse(*_, **__):
+        raise AssertionError("solved although the cache has it")
+
+    monkeypatch.setattr("splap_editor.session.bbw_binding.handle_weight", refuse)
+    opened.change_edit(replace(opened.scene.edit, blending="linear"), "Change blending")
+    main.run_until(lambda: opened.state == "settled")
+    assert opened.failures == []
+    assert opened.bound.deformer is not kept
+    np.testing.assert_array_equal(opened.bound.deformer.weights, kept.weights)
+
+
+def test_cancelling_the_weights_leaves_scene_and_cache_as_they_were(main, opened, monkeypatch):
+    weighed(main, opened)
+    scene, cache = opened.scene, opened.cache.folder
+    entries, bound, kernels = sorted(cache.iterdir()), opened.bound, scene.kernels
+    under_way, go_on = threading.Event(), threading.Event()
+
+    def slow(problem, handle, progress):
+        under_way.set()
+        while not go_on.wait(0.01):
+            progress(0.5)
+        raise AssertionError("it was to be cancelled")
+
+    with monkeypatch.context() as patched:
+        patched.setattr("splap_editor.session.bbw_binding.handle_weight", slow)
+        opened.change_edit(
+            replace(scene.edit, handles=tuple(replace(h, cage_radius=None) for h in scene.edit.handles)), "Change cage"
+        )
+        main.run_until(under_way.is_set)
+        opened.halt()
+        main.run_until(lambda: not opened.worker.is_busy())
+        opened.history.undo()
+    assert sorted(cache.iterdir()) == entries
+    assert opened.bound is bound and scene.kernels is kernels
+    opened.resume()
+    main.run_until(lambda: opened.state == "settled")
+    assert opened.bound is bound, "the weights from before still serve"
+    assert sorted(cache.iterdir()) == entries and opened.failures == []

@@ -138,7 +138,7 @@ def test_the_panel_says_how_good_the_weights_are_and_what_they_do_not_reach(driv
     placed(driver)
     lines = driver.window.deformer_panel.weights.lines
     assert len(lines) == 2
-    assert all("factorisation" in line and "KKT residual" in line and "past its bounds" in line for line in lines)
+    assert all("factorisation" in line and "KKT residual" in line and "bounds met" in line for line in lines)
     row = int(driver.scene.ellipses.rows[0])
     driver.session.add_handle(rows_region(driver.scene, disc_rows(driver.scene, row, 0.0)))
     driver.window.handles_panel.cage_form.radius.setValue(1e-6)
