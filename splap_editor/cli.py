@@ -29,7 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"splap-editor: {_sentence(error)}", file=sys.stderr)
         return EXIT_REFUSED
     except KeyboardInterrupt:
-        print("splap-editor: stopped; nothing was written", file=sys.stderr)
+        print("splap-editor: stopped; no file was left half-written", file=sys.stderr)
         return EXIT_REFUSED
 
 
@@ -54,13 +54,27 @@ def _parser() -> argparse.ArgumentParser:
 
     deform = commands.add_parser("deform", help="deform a splat PLY by a recipe")
     _add_input(deform)
-    deform.add_argument("--recipe", required=True, type=Path, metavar="EDIT.json", help="what to deform, and how")
+    _add_edit(deform, required=True)
+    _add_frames(deform, "write a PLY for each frame of a session's timeline")
     deform.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.ply")
     deform.add_argument("--as-3dgs", action="store_true", help="add a thin third scale to a file of two")
     deform.add_argument("--columns", default="", metavar="NAMES", help="also write quantities: displacement,stretch")
     deform.add_argument("--no-cache", action="store_true", help="neither read nor keep graph and Laplacian")
     _add_output(deform)
     deform.set_defaults(run=_deform)
+
+    render = commands.add_parser("render", help="draw a picture, the frames of an animation, or a turn all round")
+    _add_input(render)
+    _add_edit(render, required=False)
+    render.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.png", help="or a folder")
+    _add_frames(render, "draw a picture for each frame of a session's timeline")
+    render.add_argument("--turntable", type=int, metavar="N", help="draw N pictures all round")
+    render.add_argument("--size", type=_size, default=(1280, 720), metavar="WxH", help="in pixels; default 1280x720")
+    render.add_argument("--mode", choices=("splats", "ellipses", "points"), help="how; default splats")
+    render.add_argument("--transparent", action="store_true", help="no background")
+    render.add_argument("--no-cache", action="store_true", help="neither read nor keep graph and Laplacian")
+    _add_output(render)
+    render.set_defaults(run=_render)
 
     info = commands.add_parser("info", help="say what wrote a file, what is in it and what is odd about it")
     _add_input(info)
@@ -83,6 +97,23 @@ def _add_input(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--layout", help="read the file as this layout instead of the recognised one")
 
 
+def _add_edit(parser: argparse.ArgumentParser, *, required: bool) -> None:
+    edit = parser.add_mutually_exclusive_group(required=required)
+    edit.add_argument("--recipe", type=Path, metavar="EDIT.json", help="what to deform, and how")
+    edit.add_argument("--session", type=Path, metavar="FILE.splap", help="the same, saved by the editor")
+
+
+def _add_frames(parser: argparse.ArgumentParser, text: str) -> None:
+    parser.add_argument("--frames", nargs="?", const="", metavar="A-B", help=f"{text}; all of them by default")
+
+
+def _size(text: str) -> tuple[int, int]:
+    width, _, height = text.lower().partition("x")
+    if not (width.isdecimal() and height.isdecimal()):
+        raise argparse.ArgumentTypeError(f"must be width x height in pixels, as 1280x720, got {text!r}")
+    return int(width), int(height)
+
+
 def _add_output(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quiet", action="store_true", help="no progress lines")
     parser.add_argument("--json", action="store_true", help="one JSON object on standard output")
@@ -94,24 +125,31 @@ def _edit(options: argparse.Namespace) -> int:
     return run(options.file)
 
 
+def _render(options: argparse.Namespace) -> int:
+    from splap_editor.frames_cli import render
+
+    return render(options)
+
+
 def _deform(options: argparse.Namespace) -> int:
     from splap_editor.core.kernel_adaptation import adapted_splats
+    from splap_editor.frames_cli import deform_frames, edit_for, read_edit_file
     from splap_editor.io.ply import read_ply, write_ply
-    from splap_editor.io.recipe import read_recipe
     from splap_editor.session.cache import StageCache
     from splap_editor.session.export_report import export_report
     from splap_editor.session.pipeline import deformer_of, handles_of, kernels_of, surface_of
     from splap_editor.session.quantities import Snapshot, column_names, columns_of
-    from splap_editor.session.recipe_edit import edit_of
 
+    if options.frames is not None:
+        return deform_frames(options)
     report = StageReport(quiet=options.quiet or options.json)
     columns = column_names(options.columns)
-    recipe = read_recipe(options.recipe)
+    held = read_edit_file(options)
     with report("read"):
         file = read_ply(options.file, layout=options.layout, progress=report.progress)
     for warning in file.warnings:
         report.say(f"note: {warning}")
-    edit = edit_of(recipe, file.splats)
+    edit = edit_for(held, file, report.say)
     kernels = handles = deformer = deformation = surface = None
     if edit.active_handles or columns:
         cache = None if options.no_cache else StageCache()
@@ -211,7 +249,7 @@ def _graph(options: argparse.Namespace) -> int:
     return EXIT_OK
 
 
-_COMMANDS = ("edit", "deform", "info", "graph")
+_COMMANDS = ("edit", "deform", "render", "info", "graph")
 
 
 def _readable(info: dict, indent: str = "") -> str:

@@ -7,19 +7,9 @@ from typing import Any
 from PySide6.QtCore import QSettings
 
 from splap_editor.session.signals import Signal
+from splap_editor.viewport.looks import BACKGROUNDS, MODES
 from splap_editor.viewport.scene_view import SceneView
-from splap_editor.viewport.splat_actor import DisplayMode
 from splap_editor.viewport.splat_scene import DEFAULT_LOOKS, Compare
-from splap_editor.viewport.viewport import BACKGROUND
-
-MODES = {"ellipses": DisplayMode.ELLIPSES, "splats": DisplayMode.SPLATS, "points": DisplayMode.POINTS}
-BACKGROUNDS = {
-    "dark": BACKGROUND,
-    "grey": ((0.27, 0.27, 0.28), (0.36, 0.36, 0.37)),
-    "light": ((0.80, 0.81, 0.82), (0.93, 0.93, 0.94)),
-    "black": ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
-}
-"""Bottom and top of the gradient behind the scene."""
 
 
 @dataclass(frozen=True)

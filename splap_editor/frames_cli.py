@@ -1,0 +1,191 @@
+"""Frames and pictures from the command line."""
+
+import argparse
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from splap_editor.io.png import write_png
+from splap_editor.io.recipe import Recipe, read_recipe
+from splap_editor.io.session_file import content_hash, read_session_file
+from splap_editor.io.session_specs import SessionFile
+from splap_editor.stage_report import StageReport
+
+if TYPE_CHECKING:
+    from splap_editor.io.ply import SplatFile
+    from splap_editor.session.edit import Edit
+    from splap_editor.session.frames import FramePoser
+    from splap_editor.viewport.camera import View
+    from splap_editor.viewport.studio import Studio
+
+LARGEST_TURNTABLE = 10_000
+
+
+def read_edit_file(options: argparse.Namespace) -> Recipe | SessionFile | None:
+    """Read what ``--recipe`` or ``--session`` names, None for neither."""
+    if options.recipe is not None:
+        return read_recipe(options.recipe)
+    return read_session_file(options.session) if options.session is not None else None
+
+
+def edit_for(held: Recipe | SessionFile | None, file: "SplatFile", say: Callable[[str], None]) -> "Edit":
+    """Make an edit of a recipe or session for a file; says so where the session was made for another."""
+    from splap_editor.session.edit import Edit
+    from splap_editor.session.recipe_edit import edit_of
+    from splap_editor.session.saved_state import session_edit
+
+    if held is None:
+        return Edit()
+    if isinstance(held, Recipe):
+        return edit_of(held, file.splats)
+    if held.ply.content_hash and content_hash(file.path) != held.ply.content_hash:
+        say(f"note: {file.path.name} is not the file that the session was saved with, or has changed since")
+    return session_edit(held, file.splats)
+
+
+def deform_frames(options: argparse.Namespace) -> int:
+    """Write a PLY for each frame of a session."""
+    from splap_editor.session.frames import frame_range, write_frames
+
+    if options.columns:
+        raise ValueError("--columns goes with one PLY, not with --frames")
+    report = StageReport(quiet=options.quiet or options.json)
+    held = read_edit_file(options)
+    if not isinstance(held, SessionFile):
+        raise ValueError("--frames needs keyframes: give a session saved by the editor with --session")
+    frames = frame_range(options.frames, held.timeline.n_frames)
+    file, poser = _prepared(options, held, report)
+    with report("frames"):
+        written = write_frames(poser, file, frames, options.output, as_3dgs=options.as_3dgs, progress=report.progress)
+    _tell(options, report, written)
+    return 0
+
+
+def render(options: argparse.Namespace) -> int:
+    """Draw a picture, one for each frame, or one for each step of a turntable."""
+    from splap_editor.session.frames import frame_range, write_pictures
+    from splap_editor.viewport.studio import turntable_views
+
+    if options.turntable is not None and not 1 <= options.turntable <= LARGEST_TURNTABLE:
+        raise ValueError(f"--turntable must be 1 to {LARGEST_TURNTABLE} pictures, got {options.turntable}")
+    if options.turntable is not None and options.frames is not None:
+        raise ValueError("--frames and --turntable each make a series of pictures: give one of them")
+    report = StageReport(quiet=options.quiet or options.json)
+    held = read_edit_file(options)
+    timeline = held.timeline if isinstance(held, SessionFile) else None
+    if options.frames is not None and timeline is None:
+        raise ValueError("--frames needs keyframes: give a session saved by the editor with --session")
+    frames = frame_range(options.frames, timeline.n_frames) if options.frames is not None else None
+    file, poser = _prepared(options, held, report)
+    output = options.output
+    if output.is_dir() or output.suffix.lower() != ".png":
+        output.mkdir(parents=True, exist_ok=True)
+        output = output / f"{file.path.stem}.png"
+    with report("scene"):
+        studio, view = _studio(options, held, file)
+    try:
+
+        def draw(kernels: object) -> object:
+            studio.pose(kernels)
+            return studio.picture(view, is_transparent=options.transparent)
+
+        with report("pictures"):
+            if frames is not None:
+                written = write_pictures(poser, frames, output, draw, write_png, progress=report.progress)
+            elif options.turntable is None:
+                write_png(output, draw(_still(poser)))
+                written = [output]
+            else:
+                studio.pose(_still(poser))
+                views = turntable_views(view, options.turntable, studio.viewport.camera.world_up)
+                written = _drawn_round(studio, views, output, options.transparent, report)
+    finally:
+        studio.close()
+    _tell(options, report, written)
+    return 0
+
+
+def _prepared(
+    options: argparse.Namespace, held: Recipe | SessionFile | None, report: StageReport
+) -> tuple["SplatFile", "FramePoser"]:
+    from splap_editor.io.ply import read_ply
+    from splap_editor.session.cache import StageCache
+    from splap_editor.session.frames import frame_poser
+    from splap_editor.session.pipeline import surface_of
+
+    layout = options.layout or (held.ply.layout if isinstance(held, SessionFile) else None)
+    with report("read"):
+        file = read_ply(options.file, layout=layout, progress=report.progress)
+    for warning in file.warnings:
+        report.say(f"note: {warning}")
+    edit = edit_for(held, file, report.say)
+    cache = None if options.no_cache else StageCache()
+    surface = None
+    if edit.active_handles:
+        surface = surface_of(file.splats, edit.graph, cache=cache, stages=report.stage)
+        report.end_stage()
+    with report("bind"):
+        return file, frame_poser(surface, edit, cache=cache, progress=report.progress)
+
+
+def _still(poser: "FramePoser") -> object:
+    """Kernels of the poses that the edit itself holds."""
+    from splap_editor.session.pipeline import kernels_of
+
+    if poser.deformer is None:
+        return None
+    return kernels_of(poser.surface, poser.edit, poser.deformer.solve(poser.edit.transforms))
+
+
+def _studio(
+    options: argparse.Namespace, held: Recipe | SessionFile | None, file: "SplatFile"
+) -> tuple["Studio", "View"]:
+    """The scene off screen as the session shows it, with the choices of the command line over that."""
+    import numpy as np
+    from vtkmodules.vtkCommonCore import vtkLogger
+
+    from splap_editor.viewport.camera import View
+    from splap_editor.viewport.looks import background_named, look_named
+    from splap_editor.viewport.studio import Studio
+
+    # Without a display VTK warns before it draws by other means.
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
+    session = held if isinstance(held, SessionFile) else None
+    display = dict(session.display) if session is not None else {}
+    if options.mode is not None and options.mode != display.get("mode"):
+        # Size and cut belong to the mode they were set in.
+        display = {"background": display.get("background"), "mode": options.mode}
+    width, height = options.size
+    has_hidden = session is not None and session.ply.n_splats == file.splats.n_splats
+    hidden = session.hidden if has_hidden else None
+    studio = Studio(file.splats, look_named(display), width, height, hidden=hidden)
+    studio.viewport.set_background(*background_named(display))
+    if session is None or session.view is None:
+        return studio, studio.home()
+    spec = session.view
+    studio.viewport.camera.world_up = np.array(spec.world_up)
+    vectors = (np.array(v, np.float64) for v in (spec.position, spec.focal_point, spec.view_up))
+    return studio, View(*vectors, spec.angle, spec.is_parallel)
+
+
+def _drawn_round(
+    studio: "Studio", views: "list[View]", output: Path, is_transparent: bool, report: StageReport
+) -> list[Path]:
+    from splap_editor.session.frames import frame_path
+
+    written = []
+    for number, view in enumerate(views, start=1):
+        written.append(frame_path(output, number, len(views)))
+        write_png(written[-1], studio.picture(view, is_transparent=is_transparent))
+        report.progress(number / len(views))
+    return written
+
+
+def _tell(options: argparse.Namespace, report: StageReport, written: list[Path]) -> None:
+    if options.json:
+        print(json.dumps({"outputs": [str(path) for path in written], "timings_s": report.timings_s}))
+    elif len(written) == 1:
+        report.say(f"wrote {written[0]}")
+    else:
+        report.say(f"wrote {len(written)} files, {written[0].name} to {written[-1].name}, in {written[0].parent}")
