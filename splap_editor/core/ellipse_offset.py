@@ -228,7 +228,7 @@ def one_way_touch(discs, i, j, epsilon, limit):
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")
-def touch(discs, i, j, epsilon, limit):
+def two_way_touch(discs, i, j, epsilon, limit):
     """Touch scale of ellipses i and j: the larger of both directions; inf as soon as it is known to exceed ``limit``.
 
     The same bits for i, j and for j, i.
@@ -244,7 +244,7 @@ def touch(discs, i, j, epsilon, limit):
 def _touch_scales(discs, pairs, epsilon):
     out = np.empty(len(pairs))
     for e in range(len(pairs)):
-        out[e] = touch(discs, pairs[e, 0], pairs[e, 1], epsilon, np.inf)
+        out[e] = two_way_touch(discs, pairs[e, 0], pairs[e, 1], epsilon, np.inf)
     return out
 
 

@@ -19,7 +19,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.ellipse_offset import disc_rows, one_way_touch, touch
+from splap_editor.core.ellipse_offset import disc_rows, one_way_touch, two_way_touch
 from splap_editor.core.occupancy import Ellipses
 
 _LEAF = 8
@@ -254,7 +254,7 @@ def nearest_touches(
                         _may_meet(discs, me, other, epsilon, worst) and _may_meet(discs, other, me, epsilon, worst)
                     ):
                         continue
-                    f = touch(discs, me, other, epsilon, worst)
+                    f = two_way_touch(discs, me, other, epsilon, worst)
                     node = nodes[other]
                     if f > worst or (f == scales[q, m - 1] and node > partners[q, m - 1]):
                         continue

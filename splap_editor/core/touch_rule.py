@@ -1,17 +1,30 @@
 """The touch rule: which contacts between ellipses are edges of the splat graph."""
 
+import numba as nb
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
+from splap_editor.core.ellipse_offset import two_way_touch
 from splap_editor.core.ellipse_tree import EllipseTree, nearest_touches
 from splap_editor.core.progress import Progress, part_of
 
-N_BEST = 8
-N_GOOD = 8
-"""An edge is among the so many smallest touch scales of one end (`N_BEST`) and of the other (`N_GOOD`). Fewer tear
-thin bars, more tie near surfaces together."""
+N_PARTNERS = 6
+"""An edge is among so many best contacts of both its ends. Fewer tear thin bars apart, more tie near surfaces
+together."""
+
+REDUNDANCY = 0.4
+"""A contact is passed over if its partner and a better one are that much nearer to each other: where splats lie in
+many layers, a stack of them takes one place in the ranking and not all."""
+
+_SHORT_LIST = 12
+"""So many contacts are ranked before redundant ones are passed over."""
+
+N_NEAR = 8
+"""A contact among so many of both ends, redundant or not, closes a triangle of edges."""
+
+_CLOSING_ROUNDS = 2
 
 PEER_RATIO = 3.0
 """A splat ranks its contacts with splats of at most so many times its reach; else the few giants that cover
@@ -32,10 +45,17 @@ def touch_edges(tree: EllipseTree, epsilon: float, progress: Progress) -> tuple[
     Contacts are ranked by *touch scale*, the factor at which two ellipses just
     meet: small where centres lie in each other's ellipse, near 1 where only
     rims touch, as they do where splats overhang the border of their surface.
-    An edge is a contact of touch scale at most 1 that is among the 8 best of one
-    end and the 8 best of the other. The components this leaves are joined as a
-    minimum spanning forest by touch scale joins them: up to 1, so that whatever
-    touches is connected; and up to 2 for fragments of at most 32 nodes.
+    An edge is a contact of touch scale at most 1 that is among the 6 best of
+    both its ends. A partner that nearly coincides with a better one does not
+    count: their own touch scale is below 0.4 of its. The components this leaves
+    are joined as a minimum spanning forest by touch scale joins them: up to 1,
+    so that whatever touches is connected; and up to 2 for fragments of at most
+    32 nodes.
+
+    Distances along so sparse a graph are longer than along the surface. So a
+    contact among the 8 best of both ends, redundant or not, becomes an edge too
+    if its ends have a neighbour in common, in two rounds: this joins nothing
+    that the edges before left far apart.
 
     Parameters
     ----------
@@ -56,13 +76,38 @@ def touch_edges(tree: EllipseTree, epsilon: float, progress: Progress) -> tuple[
     n = len(tree.nodes)
     everything = np.arange(n)
     partners, scales = _nearest(
-        tree, everything, everything, epsilon, 1.0, PEER_RATIO, N_GOOD, part_of(progress, 0.0, 0.8)
+        tree, everything, everything, epsilon, 1.0, PEER_RATIO, _SHORT_LIST, part_of(progress, 0.0, 0.8)
     )
-    edges, touch = _mutual(tree, partners, scales)
+    near = _mutual(tree, partners[:, :N_NEAR], scales[:, :N_NEAR])
+    _pass_over_redundant(tree.discs, tree.places, epsilon, REDUNDANCY, partners, scales)
+    edges, touch = _mutual(tree, partners[:, :N_PARTNERS], scales[:, :N_PARTNERS])
     labels = connected_components(_adjacency(edges, n), directed=False)[1]
     labels, more, more_touch = _joined(tree, labels, epsilon, 1.0, n, part_of(progress, 0.8, 0.9))
     _, last, last_touch = _joined(tree, labels, epsilon, FRAGMENT_REACH, FRAGMENT_SIZE, part_of(progress, 0.9, 1.0))
-    return np.concatenate([edges, more, last]), np.concatenate([touch, more_touch, last_touch])
+    edges, touch = np.concatenate([edges, more, last]), np.concatenate([touch, more_touch, last_touch])
+    return _closed(edges, touch, *near, n)
+
+
+@nb.njit(nogil=True, cache=True, error_model="numpy")
+def _pass_over_redundant(discs, places, epsilon, redundancy, partners, scales):
+    """Take out of each place's contacts those whose partner nearly coincides with a better one's; close the gaps."""
+    n, m = partners.shape
+    for place in range(n):
+        kept = 0
+        for a in range(m):
+            node, f = partners[place, a], scales[place, a]
+            partners[place, a], scales[place, a] = -1, np.inf
+            if node < 0:
+                break
+            redundant = False
+            for b in range(kept):
+                near = two_way_touch(discs, places[partners[place, b]], places[node], epsilon, redundancy * f)
+                if near < redundancy * f:
+                    redundant = True
+                    break
+            if not redundant:
+                partners[place, kept], scales[place, kept] = node, f
+                kept += 1
 
 
 def _mutual(
@@ -73,15 +118,14 @@ def _mutual(
     owners = np.repeat(np.arange(len(tree.nodes)), listed.sum(axis=1))
     others = tree.places[partners[listed]]
     touch = scales[listed]
-    good = touch <= np.maximum(scales[owners, N_BEST - 1], scales[others, N_BEST - 1])
     # An ellipse that is no peer of its partner does not appear in the partner's list, but must rank as high as if.
-    foreign = (tree.reaches[owners] > PEER_RATIO * tree.reaches[others]) & (touch <= scales[others, -1]) & good
+    foreign = (tree.reaches[owners] > PEER_RATIO * tree.reaches[others]) & (touch <= scales[others, -1])
     pairs = np.stack([tree.nodes[owners], tree.nodes[others]], axis=1).astype(np.int32)
     # A contact that both ends list appears twice.
     keys = edge_keys(pairs, len(tree.nodes))
     order = np.argsort(keys, kind="stable")
     second = order[1:][keys[order[1:]] == keys[order[:-1]]]
-    kept = np.concatenate([second[good[second]], np.flatnonzero(foreign)])
+    kept = np.concatenate([second, np.flatnonzero(foreign)])
     return np.sort(pairs[kept], axis=1), touch[kept]
 
 
@@ -122,6 +166,27 @@ def labels_by_size(labels: NDArray[np.integer]) -> NDArray[np.int32]:
     rank = np.empty(len(sizes), np.int32)
     rank[np.lexsort((first, -sizes))] = np.arange(len(sizes))
     return rank[labels]
+
+
+def _closed(
+    edges: NDArray[np.int32],
+    touch: NDArray[np.float64],
+    near: NDArray[np.int32],
+    near_touch: NDArray[np.float64],
+    n_nodes: int,
+) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """Edges, and those of the ``near`` contacts whose ends share a neighbour, round by round."""
+    for _ in range(_CLOSING_ROUNDS):
+        left = ~np.isin(edge_keys(near, n_nodes), edge_keys(edges, n_nodes))
+        near, near_touch = near[left], near_touch[left]
+        upper = _adjacency(edges, n_nodes)
+        adjacency = (upper + upper.T).tocsr()
+        shares = np.zeros(len(near), bool)
+        for start in range(0, len(near), _CHUNK):
+            one, other = near[start : start + _CHUNK].T
+            shares[start : start + _CHUNK] = np.diff(adjacency[one].multiply(adjacency[other]).tocsr().indptr) > 0
+        edges, touch = np.concatenate([edges, near[shares]]), np.concatenate([touch, near_touch[shares]])
+    return edges, touch
 
 
 def _joined(

@@ -82,25 +82,28 @@ def touch_rule(
     touch: NDArray[np.float64],
     reaches: NDArray[np.float64],
     *,
-    n_best: int,
-    n_good: int,
+    short_list: int,
+    n_partners: int,
+    redundancy: float,
+    n_near: int,
     peer_ratio: float,
     fragment_size: int,
     fragment_reach: float,
 ) -> set[tuple[int, int]]:
     """Edges of the touch rule from an (n, n) matrix of touch scales, by sorting everything."""
     n = len(touch)
-    best, good = np.full(n, np.inf), np.full(n, np.inf)
+    short: list[list[int]] = []
+    lists: list[list[int]] = []
     for i in range(n):
-        peers = sorted(f for f, reach in zip(np.delete(touch[i], i), np.delete(reaches, i), strict=True)
-                       if reach <= peer_ratio * reaches[i] and f <= 1.0)  # fmt: skip
-        best[i] = peers[n_best - 1] if len(peers) >= n_best else np.inf
-        good[i] = peers[n_good - 1] if len(peers) >= n_good else np.inf
-    edges = {
-        (i, j)
-        for i, j in all_pairs(n)
-        if touch[i, j] <= min(1.0, good[i], good[j]) and touch[i, j] <= max(best[i], best[j])
-    }
+        peers = [j for j in range(n) if j != i and reaches[j] <= peer_ratio * reaches[i] and touch[i, j] <= 1.0]
+        short.append(sorted(peers, key=lambda j: (touch[i, j], j))[:short_list])
+        kept: list[int] = []
+        for j in short[i]:
+            if all(touch[j, k] >= redundancy * touch[i, j] for k in kept):
+                kept.append(j)
+        lists.append(kept[:n_partners])
+    edges = _mutual(touch, reaches, lists, n_partners, peer_ratio)
+    near = _mutual(touch, reaches, [peers[:n_near] for peers in short], n_near, peer_ratio)
     pairs = sorted((touch[i, j], i, j) for i, j in all_pairs(n) if touch[i, j] <= fragment_reach)
     for limit, size in ((1.0, n), (fragment_reach, fragment_size)):
         while True:
@@ -118,7 +121,24 @@ def touch_rule(
             if not picked:
                 break
             edges |= picked
+    for _ in range(2):
+        neighbours = [{j for edge in edges if i in edge for j in edge} - {i} for i in range(n)]
+        edges |= {(i, j) for i, j in near if neighbours[i] & neighbours[j]}
     return {(int(i), int(j)) for i, j in edges}
+
+
+def _mutual(
+    touch: NDArray[np.float64], reaches: NDArray[np.float64], lists: list[list[int]], length: int, peer_ratio: float
+) -> set[tuple[int, int]]:
+    """Pairs that list each other, or whose smaller one would list the larger if that were not too large."""
+    worst = [touch[i, kept[-1]] if len(kept) == length else 1.0 for i, kept in enumerate(lists)]
+    pairs = set()
+    for i, j in all_pairs(len(lists)):
+        small, large = (i, j) if reaches[i] <= reaches[j] else (j, i)
+        foreign = reaches[large] > peer_ratio * reaches[small] and touch[i, j] <= worst[small]
+        if small in lists[large] and (large in lists[small] or foreign):
+            pairs.add((i, j))
+    return pairs
 
 
 def _parts(n: int, edges: set[tuple[int, int]]) -> list[set[int]]:
