@@ -20,6 +20,7 @@ from splap_editor.session.jobs import Job
 from splap_editor.session.session import Session
 from splap_editor.tools.axes_tool import AxesTool
 from splap_editor.tools.handle_tool import HandleTool
+from splap_editor.tools.inspect_tool import InspectTool
 from splap_editor.tools.navigate_tool import NavigateTool
 from splap_editor.tools.select_tool import SelectTool
 from splap_editor.tools.tool import ToolContext, ToolManager
@@ -29,6 +30,7 @@ from splap_editor.ui.file_commands import sample_path
 from splap_editor.ui.main_window import MainWindow
 from splap_editor.ui.theme import apply_theme
 from splap_editor.ui.viewport_widget import ViewportWidget, surface_format
+from splap_editor.viewport.inspect_view import InspectView
 from splap_editor.viewport.scene_view import SceneView
 from splap_editor.viewport.viewport import Viewport
 from splap_editor.warm_up import is_warm, load_view_loops, warm_up_elsewhere
@@ -94,6 +96,7 @@ def make_window(cache: StageCache | None = None) -> MainWindow:
             "handle": HandleTool(context, "handle"),
             "pin": HandleTool(context, "pin"),
             "select": SelectTool(context),
+            "inspect": InspectTool(context, InspectView(session, view)),
         },
         (axes, TransformTool(context)),
         context.navigate,

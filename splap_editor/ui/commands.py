@@ -218,6 +218,10 @@ class ToolCommands:
         """Place pins."""
         self._tools.choose("pin")
 
+    def inspect(self) -> None:
+        """Look at splats and edges."""
+        self._tools.choose("inspect")
+
     def _choose_select(self, action: str) -> None:
         self._tools.cancel()
         self._select_tool.set_options(replace(self._select_tool.options, shape=SELECT_SHAPES[action]))

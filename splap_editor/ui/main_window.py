@@ -49,7 +49,7 @@ from splap_editor.ui.weight_legend import WeightLegend
 from splap_editor.viewport.scene_view import SceneView
 
 HINT = ("Click the surface to place a handle.", "Drag the arrows.")
-TOOL_COLUMN = ("tool.select", "tool.lasso", "tool.brush", "", "tool.handle", "tool.pin")
+TOOL_COLUMN = ("tool.select", "tool.lasso", "tool.brush", "", "tool.handle", "tool.pin", "", "tool.inspect")
 CONTEXT_MENU = (
     "handle.from_selection",
     "handle.pin_selection",

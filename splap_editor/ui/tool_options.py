@@ -12,7 +12,7 @@ from splap_editor.ui.actions import ActionSet
 from splap_editor.ui.number_field import NumberField, ScrubLabel
 from splap_editor.ui.theme import STEP
 
-NAMES = {"handle": "Handle", "pin": "Pin", "select": "Select"}
+NAMES = {"handle": "Handle", "pin": "Pin", "select": "Select", "inspect": "Inspect"}
 
 
 class ToolOptionsBar(QWidget):

@@ -1,7 +1,7 @@
 """A panel section that folds away."""
 
-from PySide6.QtCore import QSettings, QSize, Qt
-from PySide6.QtWidgets import QFrame, QSizePolicy, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtCore import QSettings, QSize, Qt, QTimer
+from PySide6.QtWidgets import QFrame, QScrollArea, QSizePolicy, QToolButton, QVBoxLayout, QWidget
 
 from splap_editor.ui.theme import STEP, icon
 
@@ -48,3 +48,16 @@ class Section(QFrame):
     def _unfold(self, is_open: bool) -> None:
         self.header.setIcon(icon("chevron-down" if is_open else "chevron-right"))
         self.body.setVisible(is_open)
+
+
+def bring_into_view(body: QWidget) -> None:
+    """Unfold the section of a body, and scroll to it once it has its size."""
+    section = body.parentWidget()
+    if not isinstance(section, Section):
+        return
+    section.header.setChecked(True)
+    scroll = section.parentWidget()
+    while scroll is not None and not isinstance(scroll, QScrollArea):
+        scroll = scroll.parentWidget()
+    if scroll is not None:
+        QTimer.singleShot(0, scroll, lambda: scroll.ensureWidgetVisible(section, 0, 0))
