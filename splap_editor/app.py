@@ -25,11 +25,13 @@ from splap_editor.tools.navigate_tool import NavigateTool
 from splap_editor.tools.select_tool import SelectTool
 from splap_editor.tools.tool import ToolContext, ToolManager
 from splap_editor.tools.transform_tool import TransformTool
+from splap_editor.ui.collector import MainThreadCollector
 from splap_editor.ui.display import Display
 from splap_editor.ui.file_commands import sample_path
 from splap_editor.ui.main_window import MainWindow
 from splap_editor.ui.theme import apply_theme
 from splap_editor.ui.viewport_widget import ViewportWidget, surface_format
+from splap_editor.viewport.frame_pacer import FramePacer
 from splap_editor.viewport.inspect_view import InspectView
 from splap_editor.viewport.scene_view import SceneView
 from splap_editor.viewport.viewport import Viewport
@@ -70,6 +72,9 @@ def run(path: Path | None = None) -> int:
     QCoreApplication.setApplicationName("SpLap Editor")
     apply_theme(app)
     window = make_window()
+    MainThreadCollector(window)
+    # A worker in a Python loop must not keep the window from its turn for the usual 5 ms.
+    sys.setswitchinterval(0.0005)
     sys.excepthook = _shows_in(window)
     window.show()
     window.recovery_bar.look()
@@ -83,7 +88,8 @@ def make_window(cache: StageCache | None = None) -> MainWindow:
     session = Session(mailbox.post, cache=cache or StageCache())
     widget = ViewportWidget()
     scale = widget.devicePixelRatioF()
-    viewport = Viewport(widget.render_window, widget.update, renderer=widget.renderer, scale=scale)
+    pacer = FramePacer(session, widget.update)
+    viewport = Viewport(widget.render_window, pacer, renderer=widget.renderer, scale=scale)
     view = SceneView(session, viewport)
     documents = Documents(session, mailbox.post)
     autosave = Autosave(documents, mailbox.post)

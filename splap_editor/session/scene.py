@@ -31,6 +31,7 @@ class Scene:
         self.kernels: AdaptedKernels | None = None
         self.deformation: Deformation | None = None
         self.presented: object = None
+        self.depicted: object = None
         self.selection = np.zeros(file.splats.n_splats, bool)
         self.hidden = np.zeros(file.splats.n_splats, bool)
         self.selection_sets: Mapping[str, NDArray[np.bool_]] = {}

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -9,24 +10,22 @@ from numpy.typing import NDArray
 
 from splap_editor.core.deformer import Deformation
 from splap_editor.core.handle_nodes import Region
-from splap_editor.core.kernel_adaptation import AdaptedKernels, adapted_splats
-from splap_editor.core.occupancy import occupancy_ellipses
+from splap_editor.core.kernel_adaptation import AdaptedKernels
 from splap_editor.core.splat_graph import GraphOptions
-from splap_editor.io.ply import read_ply, write_ply
 from splap_editor.io.recipe import read_recipe, write_recipe
 from splap_editor.session.bound_edit import BoundEdit, snapshot_of
 from splap_editor.session.cache import StageCache
 from splap_editor.session.commands import ChangeEdit, ChangeMask
 from splap_editor.session.edit import HANDLE_COLORS, Edit, Handle, Pose, binds_like, poses_like
-from splap_editor.session.export_report import ExportReport, export_report
+from splap_editor.session.export_report import ExportReport
 from splap_editor.session.history import History
 from splap_editor.session.jobs import Job, Post, Worker
 from splap_editor.session.keyframes import auto_keyed_edit
-from splap_editor.session.pipeline import Surface, deformer_of, handles_of, kernels_of, surface_of
-from splap_editor.session.quantities import columns_of
+from splap_editor.session.pipeline import Surface, kernels_of
 from splap_editor.session.recipe_edit import edit_of, recipe_of
 from splap_editor.session.scene import Scene
 from splap_editor.session.signals import Signal
+from splap_editor.session.work import Depictor, bound_edit, exported_file, opened_scene, prepared_surface
 
 Presenter = Callable[[AdaptedKernels | None], object]
 """Prepares on the worker what the view needs of new kernels, such as a drawing order."""
@@ -61,6 +60,8 @@ class Session:
         self.cache = cache
         self.n_threads = 4
         self.presenter: Presenter | None = None
+        self.depictor: Depictor | None = None
+        self.awaits_drag = False  # whether the next pose of a drag is on its way
         self.scene_changed = Signal()
         self.job_changed = Signal()
         self.state_changed = Signal()
@@ -88,15 +89,7 @@ class Session:
         restore : callable, optional
             Given the new scene, on the worker, before anyone else knows it: to put a saved edit in place.
         """
-
-        def read(job: Job) -> Scene:
-            file = read_ply(path, layout=layout, progress=job.progress("reading"))
-            job.report(1.0, "occupancy")
-            scene = Scene(file, occupancy_ellipses(file.splats))
-            if restore is not None:
-                restore(scene)
-            return scene
-
+        read = partial(opened_scene, path=path, layout=layout, depictor=self.depictor, restore=restore)
         cancels = ("open", "prepare", "bind", "pose")
         self._submit("open", f"Opening {path.name}", read, self._show, cancels=cancels)
 
@@ -236,13 +229,9 @@ class Session:
     def _prepare(self, scene: Scene, options: GraphOptions) -> None:
         if self._is_making("prepare", lambda wanted: wanted == options):
             return
-        splats, ellipses, cache = scene.splats, scene.ellipses, self.cache
-
-        def prepare(job: Job) -> Surface:
-            surface = surface_of(splats, options, ellipses=ellipses, cache=cache, stages=job.progress)
-            job.report(0.0, "coarse model")
-            _ = surface.arap_scene.coarse  # made here, so that the first drag need not wait for it
-            return surface
+        prepare = partial(
+            prepared_surface, splats=scene.splats, ellipses=scene.ellipses, options=options, cache=self.cache
+        )
 
         def done(surface: Surface) -> None:
             if self.scene is scene:
@@ -257,12 +246,8 @@ class Session:
     def _bind(self, scene: Scene, edit: Edit) -> None:
         if self._is_making("bind", lambda wanted: binds_like(wanted, edit)):
             return
-        surface, cache, n = scene.surface, self.cache, self.n_threads
-
-        def bind(job: Job) -> BoundEdit:
-            handles, progress = handles_of(surface, edit), job.progress("binding")
-            made = deformer_of(surface, edit, handles, cache=cache, progress=progress, stages=job.progress, n_threads=n)
-            return BoundEdit(edit, handles, made)
+        surface = scene.surface
+        bind = partial(bound_edit, surface=surface, edit=edit, cache=self.cache, n_threads=self.n_threads)
 
         def done(bound: BoundEdit) -> None:
             if self.scene is scene and scene.surface is surface:
@@ -297,6 +282,7 @@ class Session:
 
         def dragged(result: tuple) -> None:
             self._shown = (edit, False)
+            self.awaits_drag = False
             show(result)
             self._advance()
 
@@ -314,8 +300,10 @@ class Session:
 
         if dragging:
             self._set_state("dragging")
+            self.awaits_drag = True
             self._submit("drag", "", drag, dragged, wanted=edit)
         else:
+            self.awaits_drag = False
             self._set_state("settling")
             self._submit("pose", "Settling", settle, settled, wanted=edit)
 
@@ -332,14 +320,16 @@ class Session:
         if self._pending_export is None or scene.preview is not None:
             return
         (path, columns, options), self._pending_export = self._pending_export, None
-        file, kernels, edit, snapshot = scene.file, scene.kernels, scene.edit, snapshot_of(scene, self._bound)
-
-        def export(job: Job) -> ExportReport:
-            job.report(0.1, "rotating colours")
-            splats = file.splats if kernels is None else adapted_splats(file.splats, kernels)
-            job.report(0.5, "writing")
-            write_ply(path, file, splats, extra=columns_of(columns, snapshot), **options)
-            return export_report(path, file.splats, kernels)
+        edit = scene.edit
+        export = partial(
+            exported_file,
+            path=path,
+            file=scene.file,
+            kernels=scene.kernels,
+            columns=columns,
+            snapshot=snapshot_of(scene, self._bound),
+            options=options,
+        )
 
         def done(report: ExportReport) -> None:
             if self.scene is scene:
@@ -374,6 +364,7 @@ class Session:
         cancels: tuple[str, ...] = (),
     ) -> None:
         def failed(error: Exception) -> None:
+            self.awaits_drag = False
             if kind in ("prepare", "bind", "pose", "drag") and self.scene is not None:
                 self._given_up = self.scene.shown_edit
                 self._set_state("failed")

@@ -15,7 +15,7 @@ from splap_editor.session.jobs import Job
 from splap_editor.session.scene import Scene
 from splap_editor.session.session import Session
 from splap_editor.viewport.depth_order import depth_order
-from splap_editor.viewport.glyphs import base_colors, rgba_bytes, splat_glyphs
+from splap_editor.viewport.glyphs import Glyphs, base_colors, rgba_bytes, splat_glyphs
 from splap_editor.viewport.overlays import circle
 from splap_editor.viewport.projection import Projection
 from splap_editor.viewport.splat_actor import DisplayMode, SplatFlag
@@ -92,6 +92,7 @@ class SceneView:
         self._view_job: Job | None = None
         self._seen = SeenFrom(np.zeros(3), np.array([0.0, 0.0, -1.0], np.float32), False)
         viewport.splats.view_turned = self._on_view_turned
+        session.depictor = depicted
         session.presenter = lambda kernels: presented(self._scene, kernels, self._seen)
         session.scene_changed.connect(self._on_scene_changed)
         session.state_changed.connect(self._show_tints)
@@ -99,7 +100,7 @@ class SceneView:
 
     def close(self) -> None:
         """Let go of session and viewport."""
-        self._session.presenter = None
+        self._session.presenter = self._session.depictor = None
         self._scene = None
         self.viewport.close()
 
@@ -170,8 +171,8 @@ class SceneView:
         scene.edit_changed.connect(self._show_handles)
         scene.preview_changed.connect(self._show_handles)
         scene.active_handles_changed.connect(self._show_handles)
-        self._rest = splat_glyphs(scene.splats)
-        self.viewport.splats.load(self._rest, base_colors(scene.splats))
+        self._rest, colors = scene.depicted or depicted(scene.splats)
+        self.viewport.splats.load(self._rest, colors)
         self.viewport.camera.world_up = np.array(suggested_up(scene.splats))
         self.viewport.reset_camera()
         self._show_flags()
@@ -299,6 +300,11 @@ def _center(handle: Handle) -> NDArray[np.float64]:
 
 def _rgb(color: str) -> tuple[int, int, int]:
     return int(color[1:3], 16), int(color[3:5], 16), int(color[5:7], 16)
+
+
+def depicted(splats: Splats) -> tuple[Glyphs, NDArray[np.uint8]]:
+    """Make shapes and colours of a scene at rest; asked of the worker that opens it."""
+    return splat_glyphs(splats), base_colors(splats)
 
 
 def suggested_up(splats: Splats) -> tuple[float, float, float]:

@@ -286,6 +286,7 @@ def main() -> None:
     QSurfaceFormat.setDefaultFormat(surface_format())
     app = QApplication(sys.argv[:1])
     apply_theme(app)
+    sys.setswitchinterval(0.0005)  # as the program does
     with tempfile.TemporaryDirectory() as folder:
         for n_splats in options.splats:
             note(f"window: {n_splats} splats")
