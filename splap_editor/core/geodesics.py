@@ -1,5 +1,6 @@
 """Distances along the splat graph."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numba as nb
@@ -36,7 +37,9 @@ class Neighborhoods:
         return len(self.indptr) - 1
 
 
-def geodesic_neighbors(graph: SplatGraph, k: int = 30, *, progress: Progress = no_progress) -> Neighborhoods:
+def geodesic_neighbors(
+    graph: SplatGraph, k: int = 30, *, nodes: NDArray[np.integer] | None = None, progress: Progress = no_progress
+) -> Neighborhoods:
     """Find the k nearest nodes of every node by shortest path.
 
     Parameters
@@ -45,13 +48,16 @@ def geodesic_neighbors(graph: SplatGraph, k: int = 30, *, progress: Progress = n
         n nodes.
     k : int
         Number of neighbours, at least 1.
+    nodes : (m,) int, optional
+        Ascending; only of these.
     progress : Progress
         Called with the share done.
 
     Returns
     -------
     Neighborhoods
-        A component of fewer than k + 1 nodes gives fewer neighbours, an isolated node none.
+        A component of fewer than k + 1 nodes gives fewer neighbours, an isolated node none. With ``nodes`` it has m
+        rows.
 
     Raises
     ------
@@ -62,18 +68,84 @@ def geodesic_neighbors(graph: SplatGraph, k: int = 30, *, progress: Progress = n
         raise ValueError(f"k must be at least 1, got {k}")
     n = graph.n_nodes
     settled = np.full(n, np.inf)
-    counts = np.zeros(n, np.int32)
+    counts = [np.empty(0, np.int32)]
     indices, distances = [np.empty(0, np.int32)], [np.empty(0)]
-    for start in range(0, n, _CHUNK):
-        end = min(start + _CHUNK, n)
+    for start, end in node_runs(n, nodes, _CHUNK):
         near, far = np.empty((end - start, k), np.int32), np.empty((end - start, k))
-        _nearest(start, graph.indptr, graph.indices, graph.lengths, settled, near, far, counts[start:end])
-        found = np.arange(k) < counts[start:end, None]
+        counts.append(np.zeros(end - start, np.int32))
+        _nearest(start, graph.indptr, graph.indices, graph.lengths, settled, near, far, counts[-1])
+        found = np.arange(k) < counts[-1][:, None]
         indices.append(near[found])
         distances.append(far[found])
         progress(end / n)
-    indptr = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+    indptr = np.concatenate([[0], np.cumsum(np.concatenate(counts))]).astype(np.int32)
     return Neighborhoods(indptr, np.concatenate(indices), np.concatenate(distances))
+
+
+def node_runs(n_nodes: int, nodes: NDArray[np.integer] | None, most: int) -> Iterator[tuple[int, int]]:
+    """Part nodes into runs without a gap, as pairs of first and last + 1.
+
+    Parameters
+    ----------
+    n_nodes : int
+        Number of nodes n.
+    nodes : (m,) int, optional
+        Ascending; all n without.
+    most : int
+        Longest run.
+    """
+    if nodes is None:
+        edges = [(0, n_nodes)] if n_nodes else []
+    else:
+        breaks = np.flatnonzero(np.diff(nodes) != 1) + 1
+        edges = [(int(run[0]), int(run[-1]) + 1) for run in np.split(np.asarray(nodes), breaks) if len(run)]
+    for first, last in edges:
+        for start in range(first, last, most):
+            yield start, min(start + most, last)
+
+
+def mended_neighborhoods(
+    graph: SplatGraph, before: Neighborhoods, ends: NDArray[np.integer], k: int
+) -> tuple[Neighborhoods, NDArray[np.int64]]:
+    """Bring neighbourhoods up to date after edges were cut or added.
+
+    A truncated search that settles no end of a changed edge meets the same
+    edges as before in the same order, so its result stands, to the bit. Only
+    the other nodes are searched again.
+
+    Parameters
+    ----------
+    graph : SplatGraph
+        After the change.
+    before : Neighborhoods
+        From before it, with the same ``k``.
+    ends : (m,) int
+        Nodes at the ends of changed edges.
+    k : int
+        Number of neighbours.
+
+    Returns
+    -------
+    neighborhoods : Neighborhoods
+        What `geodesic_neighbors` gives.
+    nodes : (a,) int64
+        Those searched again, ascending.
+    """
+    is_end = np.zeros(graph.n_nodes, np.int64)
+    is_end[ends] = 1
+    totals = np.concatenate([[0], np.cumsum(is_end[before.indices])])
+    is_stale = (totals[before.indptr[1:]] > totals[before.indptr[:-1]]) | (is_end > 0)
+    nodes = np.flatnonzero(is_stale)
+    found = geodesic_neighbors(graph, k, nodes=nodes)
+    counts = np.diff(before.indptr)
+    kept_before = np.repeat(~is_stale, counts)
+    counts[nodes] = np.diff(found.indptr)
+    kept = np.repeat(~is_stale, counts)
+    indices, distances = np.empty(len(kept), np.int32), np.empty(len(kept))
+    indices[kept], indices[~kept] = before.indices[kept_before], found.indices
+    distances[kept], distances[~kept] = before.distances[kept_before], found.distances
+    indptr = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+    return Neighborhoods(indptr, indices, distances), nodes
 
 
 def geodesic_distances(

@@ -4,7 +4,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.geodesics import Neighborhoods
+from splap_editor.core.geodesics import Neighborhoods, node_runs
 from splap_editor.core.occupancy import Ellipses
 from splap_editor.core.progress import Progress, no_progress
 
@@ -16,7 +16,11 @@ whose circumcentre lies beyond is a sliver along the border of the surface."""
 
 
 def local_triangulations(
-    ellipses: Ellipses, neighborhoods: Neighborhoods, *, progress: Progress = no_progress
+    ellipses: Ellipses,
+    neighborhoods: Neighborhoods,
+    *,
+    nodes: NDArray[np.integer] | None = None,
+    progress: Progress = no_progress,
 ) -> NDArray[np.int32]:
     """Triangles around each node, among its geodesic neighbours.
 
@@ -32,6 +36,8 @@ def local_triangulations(
         n nodes with centres and normals.
     neighborhoods : Neighborhoods
         Geodesic neighbours of the same nodes.
+    nodes : (m,) int, optional
+        Ascending; only the stars of these.
     progress : Progress
         Called with the share done.
 
@@ -47,8 +53,7 @@ def local_triangulations(
     parts = [np.empty((0, 3), np.int32)]
     n = ellipses.n_nodes
     k = int(np.diff(neighborhoods.indptr).max(initial=0))
-    for start in range(0, n, _CHUNK):
-        end = min(start + _CHUNK, n)
+    for start, end in node_runs(n, nodes, _CHUNK):
         corners, counts = np.empty((end - start, k + 4, 2), np.int32), np.zeros(end - start, np.int32)
         _stars(start, ellipses.centers, ellipses.normals, neighborhoods.indptr, neighborhoods.indices, corners, counts)
         triangles = np.empty((int(counts.sum()), 3), np.int32)
@@ -57,6 +62,29 @@ def local_triangulations(
         parts.append(triangles)
         progress(end / n)
     return np.concatenate(parts)
+
+
+def mended_triangulations(
+    ellipses: Ellipses, neighborhoods: Neighborhoods, before: NDArray[np.int32], nodes: NDArray[np.integer]
+) -> NDArray[np.int32]:
+    """Bring the stars of some nodes up to date: what `local_triangulations` gives.
+
+    Parameters
+    ----------
+    ellipses : Ellipses
+        n nodes.
+    neighborhoods : Neighborhoods
+        After the change.
+    before : (T, 3) int32
+        All stars from before it.
+    nodes : (m,) int
+        Ascending; those whose neighbours have changed.
+    """
+    is_stale = np.zeros(ellipses.n_nodes, bool)
+    is_stale[nodes] = True
+    found = local_triangulations(ellipses, neighborhoods, nodes=nodes)
+    triangles = np.concatenate([before[~is_stale[before[:, 0]]], found])
+    return triangles[np.argsort(triangles[:, 0], kind="stable")]
 
 
 @nb.njit(nogil=True, cache=True)

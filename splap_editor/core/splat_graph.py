@@ -151,15 +151,52 @@ def splat_graph(
         edges, touch = _offset_edges(tree, epsilon, progress), None
     else:
         edges, touch = touch_edges(tree, epsilon, progress)
+    graph = _symmetric(ellipses, *_mended(ellipses, edges, touch, epsilon, cut, add), epsilon)
+    progress(1.0)
+    return graph
+
+
+def mended_graph(ellipses: Ellipses, graph: SplatGraph, options: GraphOptions) -> SplatGraph:
+    """Cut and add edges: what `splat_graph` gives with these options, without a search.
+
+    Parameters
+    ----------
+    ellipses : Ellipses
+        Occupancy ellipses of n nodes.
+    graph : SplatGraph
+        Theirs, made with the same rule and tolerance and with nothing cut or added.
+    options : GraphOptions
+        Names the edges; of those in both lists none stays.
+
+    Raises
+    ------
+    ValueError
+        As `splat_graph` does.
+    """
+    cut = _node_pairs(ellipses, options.cut, "cut")
+    add = _node_pairs(ellipses, options.add, "add")
+    upper = np.repeat(np.arange(graph.n_nodes, dtype=np.int32), graph.degrees) < graph.indices
+    touch = None if graph.touch is None else graph.touch[upper]
+    edges, touch = _mended(ellipses, graph.edges, touch, graph.epsilon, cut, add)
+    return _symmetric(ellipses, edges, touch, graph.epsilon)
+
+
+def _mended(
+    ellipses: Ellipses,
+    edges: NDArray[np.int32],
+    touch: NDArray[np.float64] | None,
+    epsilon: float,
+    cut: NDArray[np.int32],
+    add: NDArray[np.int32],
+) -> tuple[NDArray[np.int32], NDArray[np.float64] | None]:
+    """Edges (E, 2) with some added and then some cut, and their touch scales if there are any."""
     if len(add):
         edges = np.concatenate([edges, add])
         touch = None if touch is None else np.concatenate([touch, touch_scales(ellipses, add, epsilon)])
     if len(cut):
         kept = ~np.isin(edge_keys(edges, ellipses.n_nodes), edge_keys(cut, ellipses.n_nodes))
         edges, touch = edges[kept], None if touch is None else touch[kept]
-    graph = _symmetric(ellipses, edges, touch, epsilon)
-    progress(1.0)
-    return graph
+    return edges, touch
 
 
 def _offset_edges(tree: EllipseTree, epsilon: float, progress: Progress) -> NDArray[np.int32]:
