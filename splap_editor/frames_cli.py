@@ -94,10 +94,10 @@ def render(options: argparse.Namespace) -> int:
             if frames is not None:
                 written = write_pictures(poser, frames, output, draw, write_png, progress=report.progress)
             elif options.turntable is None:
-                write_png(output, draw(_still(poser)))
+                write_png(output, draw(poser.kernels(None)))
                 written = [output]
             else:
-                studio.pose(_still(poser))
+                studio.pose(poser.kernels(None))
                 views = turntable_views(view, options.turntable, studio.viewport.camera.world_up)
                 written = _drawn_round(studio, views, output, options.transparent, report)
     finally:
@@ -127,15 +127,6 @@ def _prepared(
         report.end_stage()
     with report("bind"):
         return file, frame_poser(surface, edit, cache=cache, progress=report.progress)
-
-
-def _still(poser: "FramePoser") -> object:
-    """Kernels of the poses that the edit itself holds."""
-    from splap_editor.session.pipeline import kernels_of
-
-    if poser.deformer is None:
-        return None
-    return kernels_of(poser.surface, poser.edit, poser.deformer.solve(poser.edit.transforms))
 
 
 def _studio(

@@ -32,11 +32,11 @@ class FramePoser:
     edit: Edit
     deformer: Deformer | None
 
-    def kernels(self, frame: int, *, progress: Progress = no_progress) -> AdaptedKernels | None:
-        """Adapted kernels at a frame; None for the rest pose of an edit without handles."""
+    def kernels(self, frame: int | None, *, progress: Progress = no_progress) -> AdaptedKernels | None:
+        """Adapted kernels at a frame, or of the poses that the edit itself holds; None without a handle."""
         if self.deformer is None:
             return None
-        posed = edit_at_frame(self.edit, frame)
+        posed = self.edit if frame is None else edit_at_frame(self.edit, frame)
         return kernels_of(self.surface, posed, self.deformer.solve(posed.transforms, progress=progress))
 
 

@@ -19,13 +19,13 @@ from PySide6.QtWidgets import (
 import splap_editor
 from splap_editor.session.autosave import Autosave
 from splap_editor.session.documents import Documents
-from splap_editor.session.scene import Scene
 from splap_editor.session.session import Session
 from splap_editor.tools.select_tool import SelectTool
 from splap_editor.tools.tool import ToolContext, ToolManager
 from splap_editor.ui.action_table import ACTIONS, MENUS
 from splap_editor.ui.actions import ActionSet
 from splap_editor.ui.commands import DisplayCommands, EditCommands, HandleCommands, SelectCommands, ToolCommands
+from splap_editor.ui.conditions import scene_meets
 from splap_editor.ui.display import Display
 from splap_editor.ui.document_commands import DocumentCommands
 from splap_editor.ui.file_commands import FileCommands
@@ -41,6 +41,8 @@ from splap_editor.ui.panels.section import Section
 from splap_editor.ui.picture_dialog import PictureDialog
 from splap_editor.ui.recovery_bar import RecoveryBar
 from splap_editor.ui.state_line import StateLine
+from splap_editor.ui.timeline_commands import TimelineCommands
+from splap_editor.ui.timeline_strip import TimelineStrip
 from splap_editor.ui.toast import Toast
 from splap_editor.ui.tool_options import ToolOptionsBar
 from splap_editor.ui.view_commands import ViewCommands
@@ -150,6 +152,7 @@ class MainWindow(QMainWindow):
         saving = DocumentCommands(self, session, self.documents, self.autosave, view.viewport, self.display, self.toast)
         self.document_commands = saving
         self.files = FileCommands(self, session, self.documents, self.toast, saving.save_then)
+        self.timeline_commands = TimelineCommands(self, session, view.viewport, self.toast)
         self.recovery_bar = RecoveryBar(self.autosave, self.files.leave_edit)
         self.view_commands = ViewCommands(session, view, self, self.dock)
         return ActionSet(
@@ -157,6 +160,7 @@ class MainWindow(QMainWindow):
             {
                 "file": self.files,
                 "document": saving,
+                "timeline": self.timeline_commands,
                 "edit": EditCommands(session, tools),
                 "select": SelectCommands(session, select_tool),
                 "handle": HandleCommands(session, view.viewport),
@@ -209,6 +213,8 @@ class MainWindow(QMainWindow):
         layout.addWidget(ToolOptionsBar(self.tools, self.actions_))
         layout.addWidget(self.recovery_bar)
         layout.addWidget(self.viewport, 1)
+        layout.addWidget(TimelineStrip(self.session, self.timeline_commands, self.actions_))
+        self.timeline_commands.shown_changed.connect(lambda on: self.actions_.check("timeline.show", on))
         self.setCentralWidget(centre)
 
     def _add_panels(self) -> None:
@@ -247,10 +253,10 @@ class MainWindow(QMainWindow):
         if condition in ("undo", "redo"):
             return getattr(session.history, f"can_{condition}")
         if condition == "busy":
-            return session.worker.is_busy("open", "prepare", "bind", "pose", "export")
+            return session.worker.is_busy("open", "prepare", "bind", "pose", "export", "frames")
         if condition == "halted":
             return session.state in ("halted", "failed")
-        return scene is not None and _scene_meets(scene, condition)
+        return scene is not None and scene_meets(scene, condition)
 
     def _refresh(self) -> None:
         history = self.session.history
@@ -376,6 +382,7 @@ class MainWindow(QMainWindow):
         settings.setValue("window/layout", self.saveState(LAYOUT_VERSION))
         settings.setValue("hint/done", self._has_hinted)
         self.display.save()
+        self.timeline_commands.player.stop()
         self.tools.cancel()
         self.recovery_bar.release()
         self.autosave.close()
@@ -398,26 +405,6 @@ class MainWindow(QMainWindow):
             self.restoreState(layout, LAYOUT_VERSION)
         self.actions_.check("view.panels", not self.dock.isHidden())
         self.actions_.check("view.turntable", self.view.viewport.camera.is_turntable)
-
-
-def _scene_meets(scene: Scene, condition: str) -> bool:
-    if condition == "scene":
-        return True
-    if condition == "selection":
-        return bool(scene.selection.any())
-    if condition == "surface_selection":
-        return scene.surface is not None and bool(scene.selection.any())
-    if condition == "hidden":
-        return bool(scene.hidden.any())
-    if condition == "weights":
-        return scene.edit.method == "bbw" and bool(scene.edit.handles)
-    if condition == "handles":
-        return bool(scene.edit.handles)
-    if condition == "pins":
-        return bool(scene.edit.pins)
-    if condition == "active_handles":
-        return bool(scene.active_handles)
-    raise ValueError(f"unknown condition {condition!r}")
 
 
 def _dropped_path(event: QDropEvent) -> Path | None:
