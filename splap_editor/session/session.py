@@ -260,7 +260,7 @@ class Session:
 
     def _pose(self, scene: Scene, edit: Edit) -> None:
         dragging = scene.preview is not None
-        if self.worker.is_busy("drag"):
+        if self.awaits_drag:
             return
         if not dragging and self._is_making(
             "pose", lambda wanted: binds_like(wanted, edit) and poses_like(wanted, edit)
@@ -303,7 +303,6 @@ class Session:
             self.awaits_drag = True
             self._submit("drag", "", drag, dragged, wanted=edit)
         else:
-            self.awaits_drag = False
             self._set_state("settling")
             self._submit("pose", "Settling", settle, settled, wanted=edit)
 
@@ -364,7 +363,8 @@ class Session:
         cancels: tuple[str, ...] = (),
     ) -> None:
         def failed(error: Exception) -> None:
-            self.awaits_drag = False
+            if kind == "drag":
+                self.awaits_drag = False
             if kind in ("prepare", "bind", "pose", "drag") and self.scene is not None:
                 self._given_up = self.scene.shown_edit
                 self._set_state("failed")
@@ -372,7 +372,12 @@ class Session:
             if kind == "open":
                 self._advance()
 
-        job = Job(kind, title, function, done=done, failed=failed, stopped=self._advance)
+        def stopped() -> None:
+            if kind == "drag":
+                self.awaits_drag = False
+            self._advance()
+
+        job = Job(kind, title, function, done=done, failed=failed, stopped=stopped)
         self._jobs[kind] = (job, wanted)
         self.worker.submit(job, cancels=cancels)
 

@@ -15,7 +15,7 @@ from splap_editor.session.jobs import Job
 from splap_editor.session.scene import Scene
 from splap_editor.session.session import Session
 from splap_editor.viewport.depth_order import depth_order
-from splap_editor.viewport.glyphs import Glyphs, base_colors, rgba_bytes, splat_glyphs
+from splap_editor.viewport.glyphs import Glyphs, base_colors, splat_glyphs
 from splap_editor.viewport.overlays import circle
 from splap_editor.viewport.projection import Projection
 from splap_editor.viewport.splat_actor import DisplayMode, SplatFlag
@@ -54,19 +54,49 @@ class Presented:
     colors: NDArray[np.uint8] | None
 
 
-def presented(scene: Scene, kernels: AdaptedKernels | None, seen: SeenFrom) -> Presented:
+@dataclass(frozen=True, eq=False)
+class Depiction:
+    """What drawing a scene needs of its file, made once by the worker that opens it.
+
+    Parameters
+    ----------
+    rest : Glyphs
+        Shapes at rest.
+    colors : (N, 4) uint8
+        Colours that do not depend on the view, and opacities.
+    sh0, shN : (N, 3), (N, K, 3) float32
+        Coefficients in the order in memory that reading them wants; empty where no colour depends on the view.
+    """
+
+    rest: Glyphs
+    colors: NDArray[np.uint8]
+    sh0: NDArray[np.float32]
+    shN: NDArray[np.float32]
+
+
+def depiction(splats: Splats) -> Depiction:
+    """Make shapes and colours of a scene at rest."""
+    has_view = splats.shN.shape[1] > 0
+    sh0 = np.ascontiguousarray(splats.sh0, np.float32) if has_view else np.empty((0, 3), np.float32)
+    shN = np.ascontiguousarray(splats.shN, np.float32) if has_view else np.empty((0, 0, 3), np.float32)
+    return Depiction(splat_glyphs(splats), base_colors(splats), sh0, shN)
+
+
+def presented(depicted: Depiction, kernels: AdaptedKernels | None, seen: SeenFrom) -> Presented:
     """Sort and colour splats for a view; for the worker."""
-    splats = scene.splats
-    means = np.ascontiguousarray(splats.means, np.float32) if kernels is None else kernels.means_f32
+    means = np.ascontiguousarray(depicted.rest.means, np.float32) if kernels is None else kernels.means_f32
     order = depth_order(means, seen.direction) if seen.is_blended else None
-    if not splats.shN.shape[1]:
+    if not len(depicted.shN):
         return Presented(order, None)
-    if kernels is None:
-        rotations = np.broadcast_to(np.eye(3), (splats.n_splats, 3, 3))
-    else:
-        rotations = kernels.rotations
-    rgb = view_colors(splats.sh0, splats.shN, means, rotations, seen.eye)
-    return Presented(order, rgba_bytes(rgb, splats.opacities))
+    rotations = np.broadcast_to(np.eye(3), (len(means), 3, 3)) if kernels is None else kernels.rotations
+    rgb = view_colors(depicted.sh0, depicted.shN, means, rotations, seen.eye)
+    np.nan_to_num(rgb, copy=False)
+    np.minimum(rgb, 1.0, out=rgb)
+    rgb *= 255.0
+    rgb += 0.5
+    colors = depicted.colors.copy()
+    colors[:, :3] = rgb
+    return Presented(order, colors)
 
 
 class SceneView:
@@ -84,6 +114,7 @@ class SceneView:
         self.viewport = viewport
         self._session = session
         self._scene: Scene | None = None
+        self._depicted: Depiction | None = None
         self._shows_tints = True
         self._tinted_for: tuple[object, ...] = ()
         self._paints: dict[str, NDArray[np.uint8]] = {}
@@ -92,8 +123,8 @@ class SceneView:
         self._view_job: Job | None = None
         self._seen = SeenFrom(np.zeros(3), np.array([0.0, 0.0, -1.0], np.float32), False)
         viewport.splats.view_turned = self._on_view_turned
-        session.depictor = depicted
-        session.presenter = lambda kernels: presented(self._scene, kernels, self._seen)
+        session.depictor = depiction
+        session.presenter = lambda kernels: presented(self._depicted, kernels, self._seen)
         session.scene_changed.connect(self._on_scene_changed)
         session.state_changed.connect(self._show_tints)
         self.weights = WeightView(session, viewport, self.paint)
@@ -171,8 +202,8 @@ class SceneView:
         scene.edit_changed.connect(self._show_handles)
         scene.preview_changed.connect(self._show_handles)
         scene.active_handles_changed.connect(self._show_handles)
-        self._rest, colors = scene.depicted or depicted(scene.splats)
-        self.viewport.splats.load(self._rest, colors)
+        self._depicted = scene.depicted if scene.depicted is not None else depiction(scene.splats)
+        self.viewport.splats.load(self._depicted.rest, self._depicted.colors)
         self.viewport.camera.world_up = np.array(suggested_up(scene.splats))
         self.viewport.reset_camera()
         self._show_flags()
@@ -188,7 +219,8 @@ class SceneView:
         scene, splats = self._scene, self.viewport.splats
         kernels, made = scene.kernels, scene.presented
         if kernels is None:
-            splats.move(self._rest.means, self._rest.axes_u, self._rest.axes_v)
+            rest = self._depicted.rest
+            splats.move(rest.means, rest.axes_u, rest.axes_v)
             self._ask_for_view()
         else:
             order = made.order if made is not None else None
@@ -274,7 +306,7 @@ class SceneView:
         if self._view_job is not None:
             self._wants_view = True
             return
-        scene, kernels, seen = self._scene, self._scene.kernels, self._seen
+        scene, kernels, seen, depicted = self._scene, self._scene.kernels, self._seen, self._depicted
 
         def done(made: Presented) -> None:
             if self._scene is scene and scene.kernels is kernels and self._is_shown:
@@ -290,7 +322,7 @@ class SceneView:
                 self._wants_view = False
                 self._ask_for_view()
 
-        job = Job("view", "", lambda job: presented(scene, kernels, seen), done, finished, finished)
+        job = Job("view", "", lambda job: presented(depicted, kernels, seen), done, finished, finished)
         self._view_job = self._session.view_worker.submit(job)
 
 
@@ -300,11 +332,6 @@ def _center(handle: Handle) -> NDArray[np.float64]:
 
 def _rgb(color: str) -> tuple[int, int, int]:
     return int(color[1:3], 16), int(color[3:5], 16), int(color[5:7], 16)
-
-
-def depicted(splats: Splats) -> tuple[Glyphs, NDArray[np.uint8]]:
-    """Make shapes and colours of a scene at rest; asked of the worker that opens it."""
-    return splat_glyphs(splats), base_colors(splats)
 
 
 def suggested_up(splats: Splats) -> tuple[float, float, float]:

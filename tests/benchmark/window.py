@@ -74,9 +74,10 @@ class Heart:
         self._timer.start()
 
     def worst_ms(self) -> float:
-        """Longest block since the last call, in milliseconds."""
+        """Longest block since the last call, in milliseconds; what the benchmark itself blocked before it does not count."""
         worst = 1000.0 * max(self.blocks, default=0.0)
         self.blocks.clear()
+        self._last, self._drawing = time.perf_counter(), 0.0
         return worst
 
     def _note_draw(self, milliseconds: float) -> None:
