@@ -69,8 +69,8 @@ def warm_up_elsewhere() -> subprocess.Popen:
 
 
 def _stamp() -> Path:
-    versions = f"{splap_editor.__version__}-py{sys.version_info.major}.{sys.version_info.minor}-numba{numba.__version__}"
-    return default_cache_folder() / f"compiled-{versions}"
+    python = f"py{sys.version_info.major}.{sys.version_info.minor}"
+    return default_cache_folder() / f"compiled-{splap_editor.__version__}-{python}-numba{numba.__version__}"
 
 
 def _sheet(n: int = 80) -> Splats:

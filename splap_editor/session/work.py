@@ -35,10 +35,10 @@ def opened_scene(
 
 
 def prepared_surface(
-    job: Job, splats: Splats, ellipses: Ellipses, options: GraphOptions, cache: StageCache | None
+    job: Job, splats: Splats, ellipses: Ellipses, options: GraphOptions, cache: StageCache | None, near: Surface | None
 ) -> Surface:
-    """Build everything that handles of a scene share, the coarse model of a drag included."""
-    surface = surface_of(splats, options, ellipses=ellipses, cache=cache, stages=job.progress)
+    """Build everything that handles of a scene share, a drag's coarse model included; mends go on from ``near``."""
+    surface = surface_of(splats, options, ellipses=ellipses, cache=cache, stages=job.progress, near=near)
     job.report(0.0, "coarse model")
     _ = surface.arap_scene.coarse  # made here, so that the first drag need not wait for it
     return surface

@@ -23,7 +23,7 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 
 
 def bench_stages(n_splats: int) -> None:
-    """Occupancy → Laplacian against robust_laplacian's point-cloud Laplacian, in a process of its own for its memory."""
+    """Occupancy → Laplacian against robust_laplacian's point-cloud Laplacian, in a process of its own."""
     options = ["--splats", str(n_splats), "--repeats", "3" if n_splats <= 200_000 else "1"]
     if n_splats > 500_000:
         options.append("--no-peer")

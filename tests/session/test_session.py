@@ -12,7 +12,7 @@ import pytest
 from splap_editor.cli import main as command_line
 from splap_editor.io.ply import read_ply
 from splap_editor.resources import resource
-from splap_editor.session import pipeline
+from splap_editor.session import surface_stages
 from splap_editor.session.cache import StageCache
 from splap_editor.session.edit import Pose
 from splap_editor.session.placement import disc_rows, held_pose, rows_region
@@ -103,7 +103,8 @@ def test_a_drag_shows_poses_and_settles(main, opened):
     main.run_until(lambda: opened.state == "settled")
     for step in range(1, 6):
         opened.preview_poses({handle.handle_id: Pose((0.05 * step, 0.0, 0.0))})
-        main.run_until(lambda n=len(shown): len(shown) > n)
+        before = len(shown)
+        main.run_until(lambda before=before: len(shown) > before)
     assert opened.state == "dragging" and len(opened.history._commands) == 1
     opened.commit_preview("Move handle")
     main.run_until(lambda: opened.state == "settled")
@@ -222,7 +223,7 @@ def test_an_export_that_fails_says_so_and_loses_nothing(main, opened, tmp_path):
 
 def slow_graph(monkeypatch, started):
     """Make the graph stage wait until it is cancelled."""
-    real = pipeline.splat_graph
+    real = surface_stages.splat_graph
 
     def graph(ellipses, options, *, progress):
         started.set()
@@ -230,7 +231,7 @@ def slow_graph(monkeypatch, started):
             progress(0.1)
         return real(ellipses, options, progress=progress)
 
-    monkeypatch.setattr(pipeline, "splat_graph", graph)
+    monkeypatch.setattr(surface_stages, "splat_graph", graph)
     return graph
 
 
