@@ -181,6 +181,12 @@ def mended_graph(ellipses: Ellipses, graph: SplatGraph, options: GraphOptions) -
     return _symmetric(ellipses, edges, touch, graph.epsilon)
 
 
+def require_mendable(ellipses: Ellipses, options: GraphOptions) -> None:
+    """Raise the ValueError that mending would, before any work."""
+    _node_pairs(ellipses, options.cut, "cut")
+    _node_pairs(ellipses, options.add, "add")
+
+
 def _mended(
     ellipses: Ellipses,
     edges: NDArray[np.int32],

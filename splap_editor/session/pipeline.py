@@ -12,17 +12,23 @@ from numpy.typing import NDArray
 from splap_editor.core.arap import ArapDeformer, ArapOptions
 from splap_editor.core.arap_scene import ArapScene
 from splap_editor.core.deformer import Deformation, Deformer, Handles
-from splap_editor.core.geodesics import Neighborhoods, geodesic_neighbors
+from splap_editor.core.geodesics import Neighborhoods
 from splap_editor.core.handle_nodes import handle_nodes
 from splap_editor.core.kernel_adaptation import AdaptedKernels, KernelBinding, adapt_kernels
-from splap_editor.core.laplacian import point_cloud_laplacian
-from splap_editor.core.local_triangulation import local_triangulations
 from splap_editor.core.occupancy import Ellipses, occupancy_ellipses
 from splap_editor.core.progress import Progress
-from splap_editor.core.splat_graph import GraphOptions, SplatGraph, splat_graph
+from splap_editor.core.splat_graph import GraphOptions, SplatGraph, require_mendable
 from splap_editor.core.splats import Splats
-from splap_editor.session.cache import Arrays, StageCache, content_key
+from splap_editor.session.cache import StageCache, content_key
 from splap_editor.session.edit import Edit
+from splap_editor.session.surface_stages import (
+    SurfaceStages,
+    mended_stages,
+    packed_stages,
+    plain_stages,
+    unmended,
+    unpacked_stages,
+)
 
 STAGE_VERSION = 1
 """Raised whenever a cached stage gives other numbers than before."""
@@ -43,18 +49,10 @@ class Surface:
     Parameters
     ----------
     ellipses : Ellipses
-    graph : SplatGraph
-    neighborhoods : Neighborhoods
-    triangles : (T, 3) int32
-        Local Delaunay stars.
-    L : (n, n) csr_array
-        Positive semidefinite Laplacian.
-    M : (n,) float64
-        Lumped areas.
+    stages : SurfaceStages
+        Graph, geodesics, Laplacian.
     binding : KernelBinding
         Carriers of every splat's ellipse.
-    options : GraphOptions
-        What the graph was made with.
     key : str
         Hash of everything the above was made from.
     timings_s : dict
@@ -62,15 +60,40 @@ class Surface:
     """
 
     ellipses: Ellipses
-    graph: SplatGraph
-    neighborhoods: Neighborhoods
-    triangles: NDArray[np.int32]
-    L: sp.csr_array
-    M: NDArray[np.float64]
+    stages: SurfaceStages
     binding: KernelBinding
-    options: GraphOptions
     key: str
     timings_s: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def options(self) -> GraphOptions:
+        """What the graph was made with."""
+        return self.stages.options
+
+    @property
+    def graph(self) -> SplatGraph:
+        """The splat graph, mended."""
+        return self.stages.graph
+
+    @property
+    def neighborhoods(self) -> Neighborhoods:
+        """Geodesic neighbours."""
+        return self.stages.neighborhoods
+
+    @property
+    def triangles(self) -> NDArray[np.int32]:
+        """(T, 3) local Delaunay stars."""
+        return self.stages.triangles
+
+    @property
+    def L(self) -> sp.csr_array:
+        """(n, n) positive semidefinite Laplacian."""
+        return self.stages.L
+
+    @property
+    def M(self) -> NDArray[np.float64]:
+        """(n,) lumped areas."""
+        return self.stages.M
 
     @cached_property
     def arap_scene(self) -> ArapScene:
@@ -85,8 +108,13 @@ def surface_of(
     ellipses: Ellipses | None = None,
     cache: StageCache | None = None,
     stages: StageProgress = silent,
+    near: Surface | None = None,
 ) -> Surface:
     """Build the splat graph, geodesics, Laplacian and kernel carriers of a scene.
+
+    The stages are made without mends and kept so; mends are made to them,
+    which searches again only where they reach. The result is the same to the
+    bit whichever way it came about.
 
     Parameters
     ----------
@@ -98,6 +126,8 @@ def surface_of(
         Asked before the slow stages are run, and given their results.
     stages : callable
         ``stages(name)`` gives the progress callback of a stage.
+    near : Surface, optional
+        One of the same ellipses; if it differs in mends only, it is gone on from.
 
     Raises
     ------
@@ -114,23 +144,23 @@ def surface_of(
             "no splat of this file is visible (opacity above 1/255 and a finite size), so there is no surface to "
             "deform; check the layout it was read with"
         )
-    key = content_key((STAGE_VERSION, ellipses.centers, ellipses.semi_axes, ellipses.rows, options))
-    kept = cache.load(key) if cache is not None else None
-    if kept is None:
-        with timed("graph"):
-            graph = splat_graph(ellipses, options, progress=stages("graph"))
-        with timed("geodesics"):
-            neighborhoods = geodesic_neighbors(graph, options.k, progress=stages("geodesics"))
-        with timed("laplacian"):
-            triangles = local_triangulations(ellipses, neighborhoods, progress=stages("laplacian"))
-            L, M = point_cloud_laplacian(ellipses.centers, triangles, graph=graph)
-        if cache is not None:
-            cache.store(key, _packed(graph, neighborhoods, triangles, L, M))
+    require_mendable(ellipses, options)
+    plain = unmended(options)
+    key = content_key((STAGE_VERSION, ellipses.centers, ellipses.semi_axes, ellipses.rows, plain))
+    if near is not None and near.ellipses is ellipses and unmended(near.options) == plain:
+        made = near.stages
     else:
-        graph, neighborhoods, triangles, L, M = _unpacked(kept)
+        kept = cache.load(key) if cache is not None else None
+        made = unpacked_stages(kept, options) if kept else plain_stages(ellipses, options, timed, stages)
+        if cache is not None and kept is None:
+            cache.store(key, packed_stages(made))
+    if made.options != options:
+        made = mended_stages(ellipses, made, options, timed, stages)
+    if options != plain:
+        key = content_key((key, options))
     with timed("kernels"):
-        binding = KernelBinding(splats, ellipses, neighborhoods, graph=graph, progress=stages("kernels"))
-    return Surface(ellipses, graph, neighborhoods, triangles, L, M, binding, options, key, timings)
+        binding = KernelBinding(splats, ellipses, made.neighborhoods, graph=made.graph, progress=stages("kernels"))
+    return Surface(ellipses, made, binding, key, timings)
 
 
 def handles_of(surface: Surface, edit: Edit) -> Handles:
@@ -219,37 +249,3 @@ class _Timed:
 
     def __exit__(self, *_: object) -> None:
         self._timings[self._stage] = perf_counter() - self._start
-
-
-def _packed(graph, neighborhoods, triangles, L, M) -> Arrays:
-    arrays = {
-        "graph_indptr": graph.indptr,
-        "graph_indices": graph.indices,
-        "graph_lengths": graph.lengths,
-        "graph_epsilon": np.array(graph.epsilon),
-        "near_indptr": neighborhoods.indptr,
-        "near_indices": neighborhoods.indices,
-        "near_distances": neighborhoods.distances,
-        "triangles": triangles,
-        "L_indptr": L.indptr,
-        "L_indices": L.indices,
-        "L_data": L.data,
-        "M": M,
-    }
-    if graph.touch is not None:
-        arrays["graph_touch"] = graph.touch
-    return arrays
-
-
-def _unpacked(kept: Arrays):
-    graph = SplatGraph(
-        kept["graph_indptr"],
-        kept["graph_indices"],
-        kept["graph_lengths"],
-        kept.get("graph_touch"),
-        float(kept["graph_epsilon"]),
-    )
-    neighborhoods = Neighborhoods(kept["near_indptr"], kept["near_indices"], kept["near_distances"])
-    n = len(kept["M"])
-    L = sp.csr_array((kept["L_data"], kept["L_indices"], kept["L_indptr"]), shape=(n, n))
-    return graph, neighborhoods, kept["triangles"], L, kept["M"]

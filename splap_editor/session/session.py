@@ -230,7 +230,12 @@ class Session:
         if self._is_making("prepare", lambda wanted: wanted == options):
             return
         prepare = partial(
-            prepared_surface, splats=scene.splats, ellipses=scene.ellipses, options=options, cache=self.cache
+            prepared_surface,
+            splats=scene.splats,
+            ellipses=scene.ellipses,
+            options=options,
+            cache=self.cache,
+            near=scene.surface,
         )
 
         def done(surface: Surface) -> None:
