@@ -39,7 +39,9 @@ from splap_editor.ui.panels.handles_panel import HandlesPanel
 from splap_editor.ui.panels.scene_panel import ScenePanel
 from splap_editor.ui.panels.section import Section
 from splap_editor.ui.picture_dialog import PictureDialog
+from splap_editor.ui.pose_commands import PoseCommands
 from splap_editor.ui.recovery_bar import RecoveryBar
+from splap_editor.ui.selection_sets_menu import SelectionSetsMenu
 from splap_editor.ui.state_line import StateLine
 from splap_editor.ui.timeline_commands import TimelineCommands
 from splap_editor.ui.timeline_strip import TimelineStrip
@@ -152,6 +154,7 @@ class MainWindow(QMainWindow):
         saving = DocumentCommands(self, session, self.documents, self.autosave, view.viewport, self.display, self.toast)
         self.document_commands = saving
         self.files = FileCommands(self, session, self.documents, self.toast, saving.save_then)
+        self.selection_sets = SelectionSetsMenu(session, self)
         self.timeline_commands = TimelineCommands(self, session, view.viewport, self.toast)
         self.recovery_bar = RecoveryBar(self.autosave, self.files.leave_edit)
         self.view_commands = ViewCommands(session, view, self, self.dock)
@@ -161,6 +164,8 @@ class MainWindow(QMainWindow):
                 "file": self.files,
                 "document": saving,
                 "timeline": self.timeline_commands,
+                "pose": PoseCommands(session, self.toast),
+                "sets": self.selection_sets,
                 "edit": EditCommands(session, tools),
                 "select": SelectCommands(session, select_tool),
                 "handle": HandleCommands(session, view.viewport),
@@ -185,6 +190,7 @@ class MainWindow(QMainWindow):
             elif spec.breaks:
                 menus[spec.menu].addSeparator()
             menus[spec.menu].addAction(self.actions_[spec.action_id])
+        menus["&Select"].insertMenu(self.actions_["select.through"], self.selection_sets)
         menus["&File"].insertMenu(self.actions_["file.open_sample"], self.document_commands.recent)
 
     def _add_tool_column(self) -> None:

@@ -131,7 +131,7 @@ class TimelineRuler(QWidget):
         line = QPen(QColor(ACCENT), 1.5)
         x = self.x_of(min(self._timeline.frame, self._timeline.n_frames))
         painter.setPen(line)
-        painter.drawLine(QPointF(x, 2), QPointF(x, self.height() - 2))
+        painter.drawLine(QPointF(x, middle - 7), QPointF(x, self.height() - 2))
         for frame in self._timeline.key_frames:
             if frame <= self._timeline.n_frames:
                 self._paint_diamond(painter, self._dragged_to if frame == self._dragged else frame, middle)

@@ -1,0 +1,70 @@
+"""Selections kept by name, in a menu."""
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QInputDialog, QMenu, QWidget
+
+from splap_editor.session.commands import ChangeSelectionSets
+from splap_editor.session.session import Session
+
+
+class SelectionSetsMenu(QMenu):
+    """Selects what was kept; its last entry forgets one.
+
+    Parameters
+    ----------
+    session : Session
+    parent : QWidget
+    """
+
+    def __init__(self, session: Session, parent: QWidget) -> None:
+        super().__init__("Select ke&pt", parent)
+        self._session = session
+        self._forget_menu = QMenu("&Forget", self)
+        session.scene_changed.connect(self._on_scene_changed)
+        self.setEnabled(False)
+
+    def keep(self) -> None:
+        """Ask for a name, and keep the selection under it."""
+        dialog = QInputDialog(self.parentWidget())
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.setWindowTitle("Keep selection")
+        dialog.setLabelText("Name")
+        dialog.setTextValue(f"Selection {len(self._session.scene.selection_sets) + 1}")
+        dialog.textValueSelected.connect(self.keep_as)
+        dialog.open()
+
+    def keep_as(self, name: str) -> None:
+        """Keep the selection under a name, over the one that had it."""
+        name = name.strip()
+        if name:
+            scene = self._session.scene
+            self._change({**scene.selection_sets, name: scene.selection}, "Keep selection")
+
+    def select(self, name: str) -> None:
+        """Select what was kept under a name."""
+        self._session.change_mask("selection", self._session.scene.selection_sets[name].copy(), f"Select {name}")
+
+    def forget(self, name: str) -> None:
+        """Keep it no longer."""
+        kept = self._session.scene.selection_sets
+        self._change({other: mask for other, mask in kept.items() if other != name}, "Forget selection")
+
+    def _change(self, sets: dict, label: str) -> None:
+        self._session.history.push(ChangeSelectionSets(self._session.scene, sets, label))
+
+    def _on_scene_changed(self) -> None:
+        self._session.scene.selection_sets_changed.connect(self._fill)
+        self._fill()
+
+    def _fill(self) -> None:
+        names = list(self._session.scene.selection_sets)
+        self.clear()
+        self._forget_menu.clear()
+        for name in names:
+            text = name.replace("&", "&&")
+            self.addAction(text).triggered.connect(lambda checked=False, name=name: self.select(name))
+            self._forget_menu.addAction(text).triggered.connect(lambda checked=False, name=name: self.forget(name))
+        if names:
+            self.addSeparator()
+            self.addMenu(self._forget_menu)
+        self.setEnabled(bool(names))
