@@ -115,28 +115,39 @@ def make_window(cache: StageCache | None = None) -> MainWindow:
 
 
 def _open_first(window: MainWindow, path: Path) -> None:
-    """Open the first file; on the very first start when the loops are compiled, which would freeze the window here."""
+    """Open the first file.
+
+    On the very first start the loops are compiled by other processes, since
+    it would freeze the window here: the file is shown as soon as what draws
+    it is there, and prepared when the rest is.
+    """
     session = window.session
     if is_warm():
         window.files.open_path(path)
         session.view_worker.submit(Job("load", "", lambda job: load_view_loops()))
         return
+    processes = warm_up_elsewhere()
 
-    def compile_elsewhere(job: Job) -> None:
-        process = warm_up_elsewhere()
-        try:
-            while process.poll() is None:
-                job.report(0.0, "this takes half a minute, once")
-                sleep(POLL_S)
-        finally:
-            if process.poll() is None:
-                process.terminate()
-                process.wait()
+    def wait_for(part: str) -> Callable[[Job], None]:
+        def wait(job: Job) -> None:
+            try:
+                while processes[part].poll() is None:
+                    job.report(0.0, "this takes half a minute, once")
+                    sleep(POLL_S)
+            finally:
+                if processes[part].poll() is None:
+                    processes[part].terminate()
+                    processes[part].wait()
 
-    def go_on(*_: object) -> None:
+        return wait
+
+    def show(*_: object) -> None:
         window.files.open_path(path)
+        # The worker takes this before it prepares the scene.
+        session.worker.submit(Job("warm", title, wait_for("engine")))
 
-    session.worker.submit(Job("warm", "Getting ready for this computer", compile_elsewhere, go_on, go_on, go_on))
+    title = "Getting ready for this computer"
+    session.worker.submit(Job("warm", title, wait_for("view"), show, show, show))
 
 
 def _shows_in(window: MainWindow):

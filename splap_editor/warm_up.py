@@ -14,7 +14,7 @@ import numpy as np
 import splap_editor
 from splap_editor.core.handle_nodes import Region
 from splap_editor.core.kernel_adaptation import adapted_splats
-from splap_editor.core.progress import Progress, no_progress
+from splap_editor.core.progress import no_progress
 from splap_editor.core.spherical_harmonics import view_colors
 from splap_editor.core.splat_graph import GraphOptions
 from splap_editor.core.splats import Splats
@@ -22,55 +22,60 @@ from splap_editor.session.cache import default_cache_folder
 from splap_editor.session.edit import Edit, Handle, Pose
 from splap_editor.session.pipeline import deformer_of, handles_of, kernels_of, surface_of
 
-
-def is_warm() -> bool:
-    """Whether the loops of this version, for this Python and compiler, have been compiled before."""
-    return _stamp().exists()
+PARTS = ("view", "engine")
+"""What is compiled side by side; the first is enough to show a scene."""
 
 
-def warm_up(progress: Progress = no_progress) -> None:
-    """Run every stage on a sheet of splats, so that all loops are compiled and kept."""
+def is_warm(part: str = "engine") -> bool:
+    """Whether the loops of a part, for this state of the program, this Python and compiler, have been compiled."""
+    return _stamp(part).exists()
+
+
+def warm_up(part: str) -> None:
+    """Compile the loops of a part, so that they are kept for every process to come."""
+    load_view_loops() if part == "view" else _warm_engine()
+    _stamp(part).parent.mkdir(parents=True, exist_ok=True)
+    _stamp(part).touch()
+
+
+def _warm_engine() -> None:
+    """Run every stage on a sheet of splats."""
     splats = _sheet()
     surface = surface_of(splats, GraphOptions())
-    progress(0.4)
     surface_of(splats, GraphOptions(rule="paper"))
-    progress(0.5)
     _ = surface.arap_scene.coarse
     center = surface.ellipses.centers[0]
     handles = (Handle(1, "", "#ffffff", Region(center, 0.1), Pose((0.0, 0.0, 0.3), (0.9, 0.1, 0.2, 0.3))),)
     pins = (Region(surface.ellipses.centers[-1], 0.1),)
-    for number, method in enumerate(("arap", "bbw")):
+    for method in ("arap", "bbw"):
         edit = Edit(handles, pins, method, free_radius=None)
         deformer = deformer_of(surface, edit, handles_of(surface, edit), progress=no_progress)
         deformer.drag(edit.transforms)
         kernels = kernels_of(surface, edit, deformer.solve(edit.transforms))
         # A drag that goes on from a settled pose takes another path.
         deformer.drag(edit.transforms)
-        progress(0.7 + 0.1 * number)
     adapted_splats(splats, kernels)
-    view_colors(splats.sh0, splats.shN, kernels.means, kernels.rotations, np.zeros(3))
-    _view(splats, kernels.means_f32)
-    _stamp().parent.mkdir(parents=True, exist_ok=True)
-    _stamp().touch()
-    progress(1.0)
 
 
 def load_view_loops() -> None:
-    """Load what picks, sorts and colours from the cache, off the window's thread, so that its first use is quick."""
+    """Load what picks, sorts and colours from the cache, or compile it, so that its first use is quick."""
     splats = _sheet(4)
     _view(splats, splats.means)
     n = len(splats.means)
     view_colors(splats.sh0, splats.shN, np.zeros((n, 3)), np.broadcast_to(np.eye(3), (n, 3, 3)), np.zeros(3))
 
 
-def warm_up_elsewhere() -> subprocess.Popen:
-    """Start `warm_up` in a process of its own; its exit code is 0 when all is compiled."""
-    return subprocess.Popen([sys.executable, "-m", "splap_editor.warm_up"], stdin=subprocess.DEVNULL)
+def warm_up_elsewhere() -> dict[str, subprocess.Popen]:
+    """Start `warm_up` of each part in a process of its own; an exit code of 0 says that it is compiled."""
+    command = [sys.executable, "-m", "splap_editor.warm_up"]
+    return {part: subprocess.Popen([*command, part], stdin=subprocess.DEVNULL) for part in PARTS}
 
 
-def _stamp() -> Path:
+def _stamp(part: str) -> Path:
+    """An empty file named after everything that the compiled loops depend on."""
     python = f"py{sys.version_info.major}.{sys.version_info.minor}"
-    return default_cache_folder() / f"compiled-{splap_editor.__version__}-{python}-numba{numba.__version__}"
+    newest = max(int(path.stat().st_mtime) for path in Path(splap_editor.__file__).parent.rglob("*.py"))
+    return default_cache_folder() / f"compiled-{part}-{splap_editor.__version__}-{newest}-{python}-{numba.__version__}"
 
 
 def _sheet(n: int = 80) -> Splats:
@@ -113,4 +118,5 @@ def _view(splats: Splats, means: np.ndarray) -> None:
 
 
 if __name__ == "__main__":
-    warm_up()
+    for name in sys.argv[1:] or PARTS:
+        warm_up(name)
