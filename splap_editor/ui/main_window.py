@@ -1,9 +1,7 @@
 """The window: viewport in the middle, tools at the left, panels at the right, one line of state below."""
 
-from pathlib import Path
-
 from PySide6.QtCore import QPoint, QSettings, QSize, Qt
-from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDragLeaveEvent, QDropEvent, QIcon
+from PySide6.QtGui import QCloseEvent, QIcon
 from PySide6.QtWidgets import (
     QDockWidget,
     QMainWindow,
@@ -22,16 +20,17 @@ from splap_editor.session.documents import Documents
 from splap_editor.session.session import Session
 from splap_editor.tools.select_tool import SelectTool
 from splap_editor.tools.tool import ToolContext, ToolManager
-from splap_editor.ui.action_table import ACTIONS, MENUS
 from splap_editor.ui.actions import ActionSet
 from splap_editor.ui.commands import DisplayCommands, EditCommands, HandleCommands, SelectCommands, ToolCommands
 from splap_editor.ui.conditions import scene_meets
 from splap_editor.ui.display import Display
 from splap_editor.ui.document_commands import DocumentCommands
 from splap_editor.ui.file_commands import FileCommands
+from splap_editor.ui.file_drop import FileDrop
 from splap_editor.ui.help_sheet import HelpSheet
 from splap_editor.ui.inspection import Inspection
 from splap_editor.ui.job_bar import JobBar
+from splap_editor.ui.menus import fill_menu_bar
 from splap_editor.ui.overlay import Overlay
 from splap_editor.ui.panels.deformer_panel import DeformerPanel
 from splap_editor.ui.panels.display_panel import DisplayPanel
@@ -71,7 +70,7 @@ CONTEXT_MENU = (
 LAYOUT_VERSION = 1
 
 
-class MainWindow(QMainWindow):
+class MainWindow(FileDrop, QMainWindow):
     """Puts the parts together; what they do is in the commands, what is true in the session.
 
     Parameters
@@ -108,12 +107,23 @@ class MainWindow(QMainWindow):
         self._has_hinted = QSettings().value("hint/done", False, type=bool)
         self.overlay = Overlay(context.hud, viewport)
         self.weight_legend = WeightLegend(view.weights, viewport)
-        self.inspection = Inspection(session, view, context, tools, viewport)
         self.toast = Toast(viewport)
+        self.inspection = Inspection(
+            session,
+            view,
+            context,
+            tools,
+            viewport,
+            say=self.toast.say,
+            fly_to=lambda end: self.view_commands.fly_to(end),
+        )
         self.dock = QDockWidget()
         self.dock.setObjectName("panels")
         self.actions_ = self._actions()
-        self._add_menus()
+        self.inspection.set_actions(self.actions_)
+        menus = fill_menu_bar(self.menuBar(), self.actions_)
+        menus["&Select"].insertMenu(self.actions_["select.through"], self.selection_sets)
+        menus["&File"].insertMenu(self.actions_["file.open_sample"], self.document_commands.recent)
         self._add_tool_column()
         self._add_centre()
         self._add_panels()
@@ -134,6 +144,7 @@ class MainWindow(QMainWindow):
         session.state_changed.connect(self._refresh)
         session.exported.connect(lambda report: self._refresh())
         documents.changed.connect(self._refresh)
+        self.inspection.changed.connect(self._refresh)
         session.job_changed.connect(lambda job: self._refresh())
         session.failed.connect(self._on_failed)
         self.deformer_panel.radius_hovered.connect(view.show_free_ring)
@@ -170,28 +181,13 @@ class MainWindow(QMainWindow):
                 "select": SelectCommands(session, select_tool),
                 "handle": HandleCommands(session, view.viewport),
                 "display": DisplayCommands(self.display),
+                "graph": self.inspection.commands,
                 "view": self.view_commands,
                 "tool": ToolCommands(tools, select_tool),
                 "help": self,
             },
             self._is_met,
         )
-
-    def _add_menus(self) -> None:
-        menus: dict[str, QMenu] = {title: self.menuBar().addMenu(title) for title in MENUS}
-        for spec in ACTIONS:
-            if not spec.menu:
-                continue
-            if spec.menu not in menus:
-                parent, _, title = spec.menu.rpartition("/")
-                if spec.breaks:
-                    menus[parent].addSeparator()
-                menus[spec.menu] = menus[parent].addMenu(title)
-            elif spec.breaks:
-                menus[spec.menu].addSeparator()
-            menus[spec.menu].addAction(self.actions_[spec.action_id])
-        menus["&Select"].insertMenu(self.actions_["select.through"], self.selection_sets)
-        menus["&File"].insertMenu(self.actions_["file.open_sample"], self.document_commands.recent)
 
     def _add_tool_column(self) -> None:
         column = QToolBar("Tools")
@@ -260,6 +256,9 @@ class MainWindow(QMainWindow):
             return getattr(session.history, f"can_{condition}")
         if condition == "busy":
             return session.worker.is_busy("open", "prepare", "bind", "pose", "export", "frames")
+        is_met = self.inspection.meets(condition)
+        if is_met is not None:
+            return is_met
         if condition == "halted":
             return session.state in ("halted", "failed")
         return scene is not None and scene_meets(scene, condition)
@@ -353,28 +352,6 @@ class MainWindow(QMainWindow):
         """Ask for a size and write the view as a PNG."""
         PictureDialog(self, self.view.viewport, self.session.scene.file.path, self.toast).open()
 
-    # ---------------------------------------------------------------- dropped files
-
-    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
-        """Frame the picture when the file is one that opens."""
-        path = _dropped_path(event)
-        if path is not None:
-            event.acceptProposedAction()
-            what = {".json": "edit", ".splap": "session"}.get(path.suffix.lower(), "capture")
-            self.overlay.show_drop(f"Drop to open the {what} {path.name}")
-
-    def dragLeaveEvent(self, event: QDragLeaveEvent) -> None:
-        """Take the frame away."""
-        self.overlay.show_drop("")
-
-    def dropEvent(self, event: QDropEvent) -> None:
-        """Open the file."""
-        self.overlay.show_drop("")
-        path = _dropped_path(event)
-        if path is not None:
-            event.acceptProposedAction()
-            self.files.open_path(path)
-
     # ---------------------------------------------------------------- leaving
 
     def closeEvent(self, event: QCloseEvent) -> None:
@@ -411,8 +388,3 @@ class MainWindow(QMainWindow):
             self.restoreState(layout, LAYOUT_VERSION)
         self.actions_.check("view.panels", not self.dock.isHidden())
         self.actions_.check("view.turntable", self.view.viewport.camera.is_turntable)
-
-
-def _dropped_path(event: QDropEvent) -> Path | None:
-    paths = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
-    return next((path for path in paths if path.suffix.lower() in (".ply", ".splap", ".json")), None)
