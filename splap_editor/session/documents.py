@@ -1,6 +1,7 @@
 """The session file behind the open scene: opened, saved, and compared with what is on screen."""
 
 import os
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,8 @@ from splap_editor.session.saved_state import Look, SavedState, restore_scene, sa
 from splap_editor.session.scene import Scene
 from splap_editor.session.session import Session
 from splap_editor.session.signals import Signal
+
+SAVE_TIMEOUT_S = 60.0
 
 
 class MissingPlyError(ValueError):
@@ -80,13 +83,16 @@ class Documents:
         self.opened = Signal()
         self.failed = Signal()
         self._session = session
+        self._is_written = threading.Event()
+        self._is_written.set()
         self._arrival: _Arrival | None = None
         self._source = _Source(Path())
         self._kept: SavedState | None = None
         session.scene_changed.connect(self._on_scene_changed)
 
     def close(self) -> None:
-        """Finish writing and join the worker."""
+        """Finish saving and join the worker."""
+        self._is_written.wait(SAVE_TIMEOUT_S)
         self.worker.close()
 
     # ---------------------------------------------------------------- state
@@ -189,8 +195,11 @@ class Documents:
         state, scene, source = self.state(), self._session.scene, self._source
 
         def write(job: Job) -> None:
-            _take_digest(source)
-            write_session_file(path, session_file_of(state, path.parent, source.digest))
+            try:
+                _take_digest(source)
+                write_session_file(path, session_file_of(state, path.parent, source.digest))
+            finally:
+                self._is_written.set()
 
         def done(_: None) -> None:
             if self._session.scene is scene:
@@ -199,6 +208,7 @@ class Documents:
             self.changed.emit()
 
         title = f"Saving {path.name}"
+        self._is_written.clear()
         self.worker.submit(Job("save", title, write, done, lambda error: self.failed.emit(title, error)))
 
 

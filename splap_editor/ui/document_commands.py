@@ -114,6 +114,8 @@ class DocumentCommands:
             camera.is_turntable = spec.is_turntable
             camera.view = View(*vectors, spec.angle, spec.is_parallel)
             self._viewport.camera_moved()
+            self._window.actions_.check("view.orthographic", spec.is_parallel)
+            self._window.actions_.check("view.turntable", spec.is_turntable)
         self._display.restore(session.display)
         if notes:
             self._toast.fail(" ".join(notes))

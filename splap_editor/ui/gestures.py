@@ -27,6 +27,18 @@ GESTURES: dict[str, tuple[tuple[str, str], ...]] = {
         ("Shift + Ctrl", "Keep only what is in both"),
         ("Wheel with the brush", "Size of the brush"),
     ),
+    "Inspect": (
+        ("Click a splat, a line", "Its card and neighbours, its edge"),
+        ("X", "Cut the edge"),
+        ("Esc", "Let go of the edge, then of the splat"),
+        ("Drag over the histogram", "Select by value; Shift adds, Ctrl removes"),
+        ("Drag the marks below it", "Ends of the colours; double click resets"),
+    ),
+    "Frames": (
+        ("Drag the line", "Look at a frame"),
+        ("Drag a diamond, Esc", "Move a key, drop it where it was"),
+        ("Right click on a diamond", "Delete the key"),
+    ),
     "Look": (("Hold O", "Show the original"),),
     "Numbers": (("Drag a label sideways", "Change the number"),),
 }

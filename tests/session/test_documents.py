@@ -150,6 +150,14 @@ def test_saving_without_a_name_is_refused(desk):
         desk.documents.save()
 
 
+def test_a_save_under_way_is_finished_on_closing(desk, tmp_path):
+    desk.open_ply()
+    desk.edit()
+    desk.documents.save(tmp_path / "a.splap")
+    desk.documents.close()
+    assert read_session_file(tmp_path / "a.splap").recipe.handles
+
+
 def test_a_save_that_fails_is_said_and_leaves_the_edit_dirty(desk, tmp_path):
     desk.open_ply()
     desk.edit()
