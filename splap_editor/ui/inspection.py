@@ -1,15 +1,24 @@
-"""Looking into a scene: quantities in colours, what is under the cursor."""
+"""Looking into a scene: quantities in colours, one splat or edge, the splat graph."""
 
+from collections.abc import Callable
+
+import numpy as np
 from PySide6.QtWidgets import QLabel, QWidget
 
 from splap_editor.session.graph_preview import GraphPreview
 from splap_editor.session.session import Session
+from splap_editor.session.signals import Signal
 from splap_editor.tools.probe_tool import ProbeTool
 from splap_editor.tools.tool import ToolContext, ToolManager
+from splap_editor.ui.actions import ActionSet
+from splap_editor.ui.graph_commands import CONDITIONS, GraphCommands
+from splap_editor.ui.panels.graph_panel import GraphPanel
 from splap_editor.ui.panels.inspect_panel import InspectPanel
 from splap_editor.ui.panels.quantity_panel import QuantityPanel
 from splap_editor.ui.panels.section import bring_into_view
 from splap_editor.ui.quantity_legend import QuantityLegend
+from splap_editor.viewport.camera import View
+from splap_editor.viewport.graph_view import GraphView
 from splap_editor.viewport.inspect_view import InspectView
 from splap_editor.viewport.quantity_view import QuantityView
 from splap_editor.viewport.scene_view import SceneView
@@ -17,6 +26,8 @@ from splap_editor.viewport.scene_view import SceneView
 
 class Inspection:
     """Makes and wires all that shows why a scene bends as it does.
+
+    `changed` tells that other actions can be used than before.
 
     Parameters
     ----------
@@ -26,30 +37,82 @@ class Inspection:
     tools : ToolManager
     viewport : QWidget
         Where legends go.
+    say : callable
+        Tells the person what was done.
+    fly_to : callable
+        Brings the camera to a view.
     """
 
     def __init__(
-        self, session: Session, view: SceneView, context: ToolContext, tools: ToolManager, viewport: QWidget
+        self,
+        session: Session,
+        view: SceneView,
+        context: ToolContext,
+        tools: ToolManager,
+        viewport: QWidget,
+        *,
+        say: Callable[[str], None],
+        fly_to: Callable[[View], None],
     ) -> None:
+        self.changed = Signal()
+        self._session = session
+        self._view = view
+        self._tools = tools
+        self._fly_to = fly_to
+        tool = tools.tools["inspect"]
         self.quantities = QuantityView(session, view)
+        self.inspected: InspectView = tool.inspected
+        self.graph_view = GraphView(session, view)
+        self.inspected.more_edges = lambda: self.graph_view.rows
+        self.preview, self.edge_preview = GraphPreview(session), GraphPreview(session)
+        self.commands = GraphCommands(session, self.graph_view, self.inspected, say)
+        tool.cut_asked.connect(self.commands.cut_edge)
         self.probe = ProbeTool(context)
         tools.stand(self.probe)
+        self._make_widgets(session, viewport)
+        self._connect(session)
+        self._show_value()
+
+    def _make_widgets(self, session: Session, viewport: QWidget) -> None:
         self.legend = QuantityLegend(self.quantities, viewport)
         self.read_out = QLabel()
         self.quantity_panel = QuantityPanel(session, self.quantities)
-        self._tools = tools
-        self.inspected: InspectView = tools.tools["inspect"].inspected
-        self.preview = GraphPreview(session)
-        self.inspect_panel = InspectPanel(session, self.inspected, self.preview)
+        self.inspect_panel = InspectPanel(session, self.inspected, self.edge_preview)
+        self.inspect_panel.edge_toggled.connect(self.commands.toggle_edge)
+        self.graph_panel = GraphPanel(session, self.graph_view, self.preview, self.commands)
+        self.graph_panel.component_chosen.connect(self.look_at)
         self.panels: tuple[tuple[str, QWidget], ...] = (
             ("Quantities", self.quantity_panel),
             ("Inspect", self.inspect_panel),
+            ("Graph", self.graph_panel),
         )
-        tools.chosen_changed.connect(self._on_tool_chosen)
+
+    def _connect(self, session: Session) -> None:
         self.quantities.changed.connect(self._show_value)
         self.probe.changed.connect(self._show_value)
         session.scene_changed.connect(self.probe.cancel)
-        self._show_value()
+        self._tools.chosen_changed.connect(self._on_tool_chosen)
+        self.inspected.changed.connect(self.changed.emit)
+        self.commands.kept_changed.connect(self.changed.emit)
+
+    def set_actions(self, actions: ActionSet) -> None:
+        """Give the panels the actions they have buttons for, and keep their marks right."""
+        self.graph_panel.set_actions(actions)
+
+        def check() -> None:
+            actions.check(f"graph.{self.graph_view.options.shown}")
+
+        self.graph_view.changed.connect(check)
+        check()
+
+    def meets(self, condition: str) -> bool | None:
+        """Whether a condition of an action holds; None for one that is others' business."""
+        return self.commands.meets(condition) if condition in CONDITIONS else None
+
+    def look_at(self, rows: np.ndarray) -> None:
+        """Fly to some splats, and inspect the first of them."""
+        self._fly_to(self._view.viewport.frame(rows))
+        self.inspected.pick(int(rows[0]))
 
     def _on_tool_chosen(self) -> None:
         self.inspected.is_on = self._tools.chosen.name == "inspect"

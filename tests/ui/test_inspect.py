@@ -67,7 +67,7 @@ def test_at_another_gap_the_graph_made_with_it_decides(driver, picked, qtbot):
     rows, _ = middle_of_longest_line(driver)
     inspection.inspected.pick_edge(rows)
     inspection.inspect_panel.epsilon.setValue(2.0)
-    qtbot.waitUntil(lambda: inspection.preview.graph is not None, timeout=WAIT_MS)
+    qtbot.waitUntil(lambda: inspection.edge_preview.graph is not None, timeout=WAIT_MS)
     assert "in the graph" in inspection.inspect_panel.verdict.text()
 
 

@@ -39,11 +39,12 @@ def test_the_value_under_the_cursor_is_in_the_status_line(driver, size_shown, qt
     at = driver.surface_pixel()
     driver.move(at + QPoint(1, 0))
     driver.move(at)
+    qtbot.waitUntil(lambda: inspection.read_out.text() != "", timeout=WAIT_MS)
     row = inspection.probe.row
     expected = inspection.quantities.shown.values[row]
     assert inspection.read_out.text() == f"Size: {expected:.4g} · row {row:,}"
     driver.move(QPoint(2, 2))
-    assert inspection.read_out.text() == ""
+    qtbot.waitUntil(lambda: inspection.read_out.text() == "", timeout=WAIT_MS)
 
 
 def test_a_drag_over_the_histogram_selects_by_value_as_one_undoable_step(driver, size_shown):

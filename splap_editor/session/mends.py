@@ -1,0 +1,150 @@
+"""Cutting and joining the splat graph by hand: pairs of file rows, as an edit keeps them."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from splap_editor.core.ellipse_offset import touch_scales
+from splap_editor.core.occupancy import Ellipses
+from splap_editor.core.splat_graph import GraphOptions, SplatGraph
+
+Pairs = NDArray[np.int64]
+
+N_CANDIDATES = 12
+"""Nearest centres on the other side among which a splat looks for its best contact."""
+
+FRAGMENT_SHARE = 0.01
+"""A component of at most such a share of all nodes is a fragment, if it is not the largest."""
+
+JOIN_REACH = 3.0
+"""A fragment is joined where centres are no farther apart than so many times both reaches together."""
+
+N_LINKS = 3
+"""Best contacts by which a fragment is tied: one alone would let it turn freely."""
+
+
+def with_cut(options: GraphOptions, pairs: Iterable[tuple[int, int]]) -> GraphOptions:
+    """Cut edges between file rows; one that was added by hand is merely taken back."""
+    pairs, add = _sorted_pairs(pairs), _sorted_pairs(options.add)
+    cut = tuple(sorted(_sorted_pairs(options.cut) | (pairs - add)))
+    return replace(options, cut=cut, add=tuple(sorted(add - pairs)))
+
+
+def with_added(options: GraphOptions, pairs: Iterable[tuple[int, int]]) -> GraphOptions:
+    """Add edges between file rows; one that was cut by hand is merely put back."""
+    pairs, cut = _sorted_pairs(pairs), _sorted_pairs(options.cut)
+    add = tuple(sorted(_sorted_pairs(options.add) | (pairs - cut)))
+    return replace(options, cut=tuple(sorted(cut - pairs)), add=add)
+
+
+def edges_between(
+    ellipses: Ellipses, graph: SplatGraph, first: NDArray[np.bool_], second: NDArray[np.bool_]
+) -> list[tuple[int, int]]:
+    """Edges with one end in each of two masks (N,) over file rows, as pairs of rows."""
+    rows = ellipses.rows[graph.edges]
+    ends = first[rows], second[rows]
+    crossing = (ends[0][:, 0] & ends[1][:, 1]) | (ends[0][:, 1] & ends[1][:, 0])
+    return _as_pairs(rows[crossing])
+
+
+def best_links(
+    ellipses: Ellipses, epsilon: float, first: NDArray[np.bool_], second: NDArray[np.bool_]
+) -> list[tuple[int, int]]:
+    """Contacts by which two selections are best joined.
+
+    Each splat of one side ranks its nearest centres on the other by touch
+    scale, then by distance; those that choose each other are joined, at least
+    the best pair of all.
+
+    Parameters
+    ----------
+    ellipses : Ellipses
+    epsilon : float
+        Tolerance in units of the scene scale.
+    first, second : (N,) bool
+        Over file rows; what both have belongs to the first.
+
+    Returns
+    -------
+    list of (int, int)
+        File rows; empty if a side has no active splat.
+    """
+    a = np.flatnonzero(first[ellipses.rows])
+    b = np.flatnonzero((second & ~first)[ellipses.rows])
+    if not len(a) or not len(b):
+        return []
+    pairs = np.concatenate([_near_pairs(ellipses, a, b), _near_pairs(ellipses, b, a)[:, ::-1]])
+    pairs = np.unique(pairs, axis=0)
+    order = _by_contact(ellipses, pairs, epsilon)
+    pairs = pairs[order]
+    # The best of each end comes first in the order.
+    best = [np.unique(pairs[:, side], return_index=True)[1] for side in (0, 1)]
+    chosen = np.union1d(np.intersect1d(*best), [0])
+    return _as_pairs(ellipses.rows[pairs[chosen]])
+
+
+def fragments(graph: SplatGraph) -> NDArray[np.int64]:
+    """Labels of the components that are small beside the whole, ascending; never the largest."""
+    sizes = np.bincount(graph.components) if graph.n_nodes else np.zeros(0, np.int64)
+    small = np.flatnonzero(sizes <= max(FRAGMENT_SHARE * graph.n_nodes, 1.0))
+    return small[small > 0]
+
+
+def fragment_links(ellipses: Ellipses, graph: SplatGraph, epsilon: float) -> tuple[list[tuple[int, int]], int]:
+    """Contacts that tie each fragment to what is around it.
+
+    Parameters
+    ----------
+    ellipses : Ellipses
+    graph : SplatGraph
+    epsilon : float
+        Tolerance in units of the scene scale.
+
+    Returns
+    -------
+    pairs : list of (int, int)
+        File rows: up to three best contacts of each fragment with components that are none.
+    n_left : int
+        Fragments too far from everything to be joined.
+    """
+    small = fragments(graph)
+    is_small = np.isin(graph.components, small)
+    a, b = np.flatnonzero(is_small), np.flatnonzero(~is_small)
+    if not len(a) or not len(b):
+        return [], len(small)
+    pairs = _near_pairs(ellipses, a, b)
+    apart = np.linalg.norm(ellipses.centers[pairs[:, 0]] - ellipses.centers[pairs[:, 1]], axis=1)
+    pairs = pairs[apart <= JOIN_REACH * ellipses.reaches[pairs].sum(axis=1)]
+    pairs = pairs[_by_contact(ellipses, pairs, epsilon)]
+    owners = graph.components[pairs[:, 0]]
+    # Rank within the fragment: pairs are in order of contact, and a stable sort keeps that for each owner.
+    order = np.argsort(owners, kind="stable")
+    starts = np.flatnonzero(np.diff(owners[order], prepend=-1))
+    ranks = np.arange(len(order)) - np.repeat(starts, np.diff(np.append(starts, len(order))))
+    chosen = order[ranks < N_LINKS]
+    return _as_pairs(ellipses.rows[pairs[chosen]]), len(small) - len(starts)
+
+
+def _near_pairs(ellipses: Ellipses, a: NDArray[np.int64], b: NDArray[np.int64]) -> Pairs:
+    """(P, 2) each node of a with its nearest ones of b."""
+    k = min(N_CANDIDATES, len(b))
+    near = cKDTree(ellipses.centers[b]).query(ellipses.centers[a], k=k)[1].reshape(len(a), k)
+    return np.stack([np.repeat(a, k), b[near.ravel()]], axis=1)
+
+
+def _by_contact(ellipses: Ellipses, pairs: Pairs, epsilon: float) -> NDArray[np.int64]:
+    """Order of pairs by touch scale, those that never touch by distance after all others."""
+    scales = touch_scales(ellipses, pairs, epsilon * ellipses.scene_scale)
+    apart = np.linalg.norm(ellipses.centers[pairs[:, 0]] - ellipses.centers[pairs[:, 1]], axis=1)
+    return np.lexsort((pairs[:, 1], pairs[:, 0], apart, scales))
+
+
+def _as_pairs(rows: NDArray[np.integer]) -> list[tuple[int, int]]:
+    return sorted(_sorted_pairs(rows.tolist()))
+
+
+def _sorted_pairs(pairs: Iterable[Iterable[int]]) -> set[tuple[int, int]]:
+    return {(min(pair), max(pair)) for pair in map(tuple, pairs)}

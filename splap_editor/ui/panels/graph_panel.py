@@ -1,0 +1,267 @@
+"""The splat graph: edges in view, its options with a preview, components, mends."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import (
+    QGridLayout,
+    QHBoxLayout,
+    QLabel,
+    QListWidget,
+    QListWidgetItem,
+    QPushButton,
+    QSizePolicy,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from splap_editor.core.splat_graph import GraphOptions, SplatGraph
+from splap_editor.session.graph_preview import GraphPreview
+from splap_editor.session.session import Session
+from splap_editor.ui.actions import ActionSet
+from splap_editor.ui.graph_commands import GraphCommands
+from splap_editor.ui.number_field import set_tone
+from splap_editor.ui.options_form import FieldHint, OptionsForm
+from splap_editor.ui.theme import STEP
+from splap_editor.viewport.graph_view import EDGE_COLORS, GraphView
+
+MOST_LISTED = 60
+
+VIEW_HINTS = {
+    "hops": FieldHint(
+        "Steps", "How far from the selection edges are drawn.", low=1, high=50, only_for=("shown", ("near",))
+    ),
+    "color": FieldHint("Colour by", "What the colour of an edge says.", choices=EDGE_COLORS),
+}
+
+
+@dataclass(frozen=True)
+class RuleOptions:
+    """The part of `GraphOptions` that the form edits; ε in percent."""
+
+    rule: str
+    epsilon: float
+    k: int
+
+
+RULE_HINTS = {
+    "rule": FieldHint(
+        "Rule", "How neighbours are chosen.", choices={"touch": "Best contacts", "paper": "All within the gap"}
+    ),
+    "epsilon": FieldHint(
+        "Gap ε",
+        "Gap that still counts as touching, in percent of the size.",
+        unit="%",
+        high=20.0,
+        step=0.05,
+        decimals=3,
+    ),
+    "k": FieldHint("Neighbours k", "Nearest along the surface that the Laplacian is made of.", low=3, high=500),
+}
+
+
+class GraphPanel(QWidget):
+    """Follows graph, edit and preview; changes nothing before Apply."""
+
+    component_chosen = Signal(object)
+    """File rows of a component to look at."""
+
+    def __init__(
+        self,
+        session: Session,
+        view: GraphView,
+        preview: GraphPreview,
+        commands: GraphCommands,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._session = session
+        self._view = view
+        self._preview = preview
+        self._commands = commands
+        self._wanted: RuleOptions | None = None
+        self._listed: SplatGraph | None = None
+        self._segments = QHBoxLayout()
+        self._segments.setSpacing(0)
+        self.form = OptionsForm(view.options, VIEW_HINTS)
+        self.form.changed.connect(lambda options: view.set(hops=options.hops, color=options.color))
+        self.counts = _label()
+        self.rule = OptionsForm(RuleOptions("touch", 0.5, 30), RULE_HINTS)
+        self.rule.changed.connect(self._on_rule_changed)
+        self.estimate = _label()
+        self.apply = QPushButton("Apply")
+        self.apply.clicked.connect(self._on_applied)
+        self.revert = QPushButton("Revert")
+        self.revert.setFlat(True)
+        self.revert.clicked.connect(self._on_reverted)
+        self.components = QListWidget(toolTip="Components by size; click one to look at it")
+        self.components.setFixedHeight(96)
+        self.components.itemClicked.connect(
+            lambda item: self.component_chosen.emit(self._rows_of(item.data(Qt.ItemDataRole.UserRole)))
+        )
+        self.mends = _label()
+        self._buttons = QGridLayout()
+        self._add_parts()
+        view.changed.connect(self._show_view)
+        preview.changed.connect(self._show_estimate)
+        commands.kept_changed.connect(self._show_mends)
+        session.scene_changed.connect(self._on_scene_changed)
+        self._show()
+
+    def set_actions(self, actions: ActionSet) -> None:
+        """Make the buttons that perform actions."""
+        for name in ("off", "near", "all"):
+            self._segments.addWidget(_action_button(actions, f"graph.{name}"), 1)
+        names = ("keep_selection", "cut_between", "join", "join_fragments", "clear_mends")
+        for k, name in enumerate(names):
+            self._buttons.addWidget(_action_button(actions, f"graph.{name}"), k // 2, k % 2)
+
+    def _add_parts(self) -> None:
+        self._asked = QWidget()
+        asked = QHBoxLayout(self._asked)
+        asked.setContentsMargins(0, 0, 0, 0)
+        asked.addWidget(self.apply, 1)
+        asked.addWidget(self.revert)
+        layout = QVBoxLayout(self)
+        layout.setSpacing(2 * STEP)
+        layout.addLayout(self._segments)
+        for part in (self.form, self.counts, self.rule, self.estimate, self._asked, self.components, self.mends):
+            layout.addWidget(part)
+        self._buttons.setSpacing(STEP)
+        layout.addLayout(self._buttons)
+
+    # Showing ------------------------------------------------------------------------------------------------------
+
+    def _on_scene_changed(self) -> None:
+        scene = self._session.scene
+        self._wanted = self._listed = None
+        scene.surface_changed.connect(self._show)
+        scene.edit_changed.connect(self._show)
+        self._show()
+
+    @property
+    def _graph(self) -> SplatGraph | None:
+        scene = self._session.scene
+        return scene.surface.graph if scene is not None and scene.surface is not None else None
+
+    def _show(self) -> None:
+        scene = self._session.scene
+        self.setEnabled(scene is not None)
+        if scene is not None and self._wanted in (None, _rule_options(scene.edit.graph)):
+            self._wanted = None
+            self.rule.show_value(_rule_options(scene.edit.graph))
+        self._show_view()
+        self._show_estimate()
+        self._show_components()
+        self._show_mends()
+
+    def _show_view(self) -> None:
+        self.form.show_value(self._view.options)
+        graph = self._graph
+        if graph is None:
+            self.counts.setText("The graph is being made.")
+            return
+        text = f"{graph.n_edges:,} edges, {2 * graph.n_edges / max(graph.n_nodes, 1):.3g} at a splat"
+        made = self._view.colored
+        if self._view.options.shown != "off":
+            text += f"<br>{self._view.n_shown:,} in view"
+            if made is not None and np.isfinite(made.high):
+                text += f"; {EDGE_COLORS[made.color].lower()} from {made.low:.3g} (dark) to {made.high:.3g} (bright)"
+        self.counts.setText(text)
+
+    def _show_estimate(self) -> None:
+        preview, wanted = self._preview, self._wanted
+        self._asked.setVisible(wanted is not None)
+        self.estimate.setVisible(wanted is not None)
+        if wanted is None:
+            return
+        text, tone = "Counting edges …", "quiet"
+        if preview.error:
+            text, tone = preview.error, "danger"
+        elif preview.graph is not None and preview.wanted == self._wanted_options(k=GraphOptions.k):
+            n, pieces = preview.graph.n_edges, int(preview.graph.components.max(initial=-1)) + 1
+            change = n - self._graph.n_edges if self._graph is not None else 0
+            text = f"{n:,} edges ({change:+,}), {_pieces(pieces)}"
+        elif preview.share:
+            text = f"Counting edges … {100 * preview.share:.0f} %"
+        self.estimate.setText(text)
+        set_tone(self.estimate, tone)
+
+    def _show_components(self) -> None:
+        graph = self._graph
+        if graph is self._listed:
+            return
+        self._listed = graph
+        self.components.clear()
+        sizes = np.bincount(graph.components) if graph is not None and graph.n_nodes else np.zeros(0, int)
+        for label, size in enumerate(sizes[:MOST_LISTED].tolist()):
+            item = QListWidgetItem(f"{label}: {size:,} splat{'' if size == 1 else 's'}")
+            item.setData(Qt.ItemDataRole.UserRole, label)
+            self.components.addItem(item)
+        if len(sizes) > MOST_LISTED:
+            item = QListWidgetItem(f"and {len(sizes) - MOST_LISTED:,} more, of at most {sizes[MOST_LISTED]:,}")
+            item.setFlags(Qt.ItemFlag.NoItemFlags)
+            self.components.addItem(item)
+        self.components.setVisible(len(sizes) > 1)
+
+    def _rows_of(self, label: int) -> np.ndarray:
+        scene = self._session.scene
+        return scene.ellipses.rows[self._graph.components == label]
+
+    def _show_mends(self) -> None:
+        scene = self._session.scene
+        options = scene.edit.graph if scene is not None else GraphOptions()
+        words = f"{len(options.cut):,} cut and {len(options.add):,} added by hand" if options.cut or options.add else ""
+        if self._commands.kept is not None:
+            words += f"{'; s' if words else 'S'}ide A has {np.count_nonzero(self._commands.kept):,} splats"
+        self.mends.setText(words)
+        self.mends.setVisible(bool(words))
+
+    # Changing the rule --------------------------------------------------------------------------------------------
+
+    def _wanted_options(self, **changes: object) -> GraphOptions:
+        wanted = self._wanted
+        options = replace(self._session.scene.edit.graph, rule=wanted.rule, epsilon=wanted.epsilon / 100.0, k=wanted.k)
+        return replace(options, **changes)
+
+    def _on_rule_changed(self, wanted: RuleOptions) -> None:
+        if self._session.scene is None:
+            return
+        self._wanted = wanted if wanted != _rule_options(self._session.scene.edit.graph) else None
+        if self._wanted is not None:
+            self._preview.ask(self._wanted_options())
+        self._show_estimate()
+
+    def _on_applied(self) -> None:
+        options, self._wanted = self._wanted_options(), None
+        self._session.change_edit(replace(self._session.scene.edit, graph=options), "Change graph")
+
+    def _on_reverted(self) -> None:
+        self._wanted = None
+        self._preview.clear()
+        self._show()
+
+
+def _rule_options(options: GraphOptions) -> RuleOptions:
+    return RuleOptions(options.rule, round(100.0 * options.epsilon, 6), options.k)
+
+
+def _pieces(n: int) -> str:
+    return "in one piece" if n == 1 else f"in {n:,} pieces"
+
+
+def _label() -> QLabel:
+    label = QLabel(wordWrap=True)
+    label.setProperty("tone", "quiet")
+    return label
+
+
+def _action_button(actions: ActionSet, action_id: str) -> QToolButton:
+    button = QToolButton()
+    button.setDefaultAction(actions[action_id])
+    button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextOnly)
+    button.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+    button.setObjectName("segment")
+    return button
