@@ -142,7 +142,8 @@ def _meeting(c0, c1, a00, a01, a10, a11, limit):
     search ends with inf at the first one above ``limit``.
     """
     p, q, r = a00 * a00 + a01 * a01, a00 * a10 + a01 * a11, a10 * a10 + a11 * a11
-    half, radius = 0.5 * (p - r), np.hypot(0.5 * (p - r), q)
+    half = 0.5 * (p - r)
+    radius = np.sqrt(half * half + q * q)
     s1 = 0.5 * (p + r) + radius
     # Perpendicular planes have s2 = 0 and the maximum at t = 1, where d2 vanishes with it.
     s2 = max((a00 * a11 - a01 * a10) ** 2 / s1, 1e-24)
@@ -163,15 +164,18 @@ def _meeting(c0, c1, a00, a01, a10, a11, limit):
     t = (w1 * low + w2 * high) / (w1 + w2)
     if low < high:
         for _ in range(_NEWTON_STEPS):
-            d1, d2 = 1.0 - t + t * s1, 1.0 - t + t * s2
-            if t * (1.0 - t) * (w1 / d1 + w2 / d2) > limit:
+            # Reciprocals once: divisions are what this loop's time goes to.
+            r1, r2 = 1.0 / (1.0 - t + t * s1), 1.0 / (1.0 - t + t * s2)
+            v1, v2 = w1 * r1, w2 * r2
+            if t * (1.0 - t) * (v1 + v2) > limit:
                 return np.inf, 0.0, 0.0
-            slope = w1 * ((1.0 - t) ** 2 - t * t * s1) / (d1 * d1) + w2 * ((1.0 - t) ** 2 - t * t * s2) / (d2 * d2)
+            here, there = (1.0 - t) * (1.0 - t), t * t
+            slope = v1 * r1 * (here - there * s1) + v2 * r2 * (here - there * s2)
             if slope > 0.0:
                 low = t
             else:
                 high = t
-            bend = 2.0 * (w1 * s1 / (d1 * d1 * d1) + w2 * s2 / (d2 * d2 * d2))
+            bend = 2.0 * (v1 * s1 * r1 * r1 + v2 * s2 * r2 * r2)
             new = t + slope / bend if bend > 0.0 else 0.5 * (low + high)
             if not low <= new <= high:
                 new = 0.5 * (low + high)

@@ -7,9 +7,10 @@ binary tree over its Morton order:
             │     └─ 5 ── leaf: ellipses 8 to 15
             └─ 3 ─┬─ 6 …
 
-A slot knows the box of its centres and its largest semi-axis, which bound the
-touch scale from below: ``|p_i - p_j| ≤ f (reach_i + reach_j) + ε``. With the
-sizes in one tree alike, a handful of huge ellipses loosens no bound but theirs.
+A slot knows the box of its centres and how far its ellipses extend from them
+along each axis, which bounds the touch scale from below: along any direction,
+``|p_i - p_j| ≤ f (extent_i + extent_j) + ε``. With the sizes in one tree alike,
+a handful of huge ellipses loosens no bound but theirs.
 """
 
 from dataclasses import dataclass
@@ -22,7 +23,8 @@ from numpy.typing import NDArray
 from splap_editor.core.ellipse_offset import disc_rows, one_way_touch, two_way_touch
 from splap_editor.core.occupancy import Ellipses
 
-_LEAF = 8
+_LEAF = 4
+_BLOCK = 1024
 _CLASS_RATIO = 3.0
 """Largest over smallest reach in one size class."""
 
@@ -44,9 +46,9 @@ class EllipseTree:
     classes : (C, 4) int64
         First place, end place, first slot and number of leaves (a power of two)
         of each class, small ellipses first. Slot 1 of a class is its root.
-    boxes : (S, 7) float64
-        Least and greatest corner of the centres and the largest reach in each slot; an empty slot's box
-        is inverted and infinitely far from everything.
+    boxes : (S, 9) float64
+        Least and greatest corner of the centres and largest extents along x, y, z in each slot; an
+        empty slot's box is inverted and infinitely far from everything.
     """
 
     nodes: NDArray[np.int64]
@@ -113,27 +115,28 @@ def ellipse_tree(ellipses: Ellipses) -> EllipseTree:
     places[nodes] = np.arange(len(nodes))
     reaches = reaches[nodes]
     rows = disc_rows(ellipses)[nodes]
+    extents = np.sqrt(rows[:, 3:6] ** 2 + rows[:, 6:9] ** 2)
     bounds = np.append(np.flatnonzero(np.diff(sizes[nodes], prepend=-1)), len(nodes))
     classes = np.zeros((len(bounds) - 1, 4), np.int64)
     boxes, slot = [], 0
     for c, (first, end) in enumerate(pairwise(bounds)):
-        box = _class_boxes(rows[first:end, :3], reaches[first:end])
+        box = _class_boxes(rows[first:end, :3], extents[first:end])
         classes[c] = first, end, slot, len(box) // 2
         boxes.append(box)
         slot += len(box)
-    return EllipseTree(nodes, places, rows, reaches, classes, np.concatenate(boxes) if boxes else np.empty((0, 7)))
+    return EllipseTree(nodes, places, rows, reaches, classes, np.concatenate(boxes) if boxes else np.empty((0, 9)))
 
 
-def _class_boxes(centers: NDArray[np.float64], reaches: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(2 leaves, 7) boxes of one class's slots; slot 0 is unused."""
+def _class_boxes(centers: NDArray[np.float64], extents: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(2 leaves, 9) boxes of one class's slots; slot 0 is unused."""
     n_leaves = 1 << (-(-len(centers) // _LEAF) - 1).bit_length()
-    padded = np.full((n_leaves * _LEAF, 7), -np.inf)
-    # Negated least corners, so that one maximum serves all seven.
+    padded = np.full((n_leaves * _LEAF, 9), -np.inf)
+    # Negated least corners, so that one maximum serves all nine.
     padded[: len(centers), :3] = -centers
     padded[: len(centers), 3:6] = centers
-    padded[: len(centers), 6] = reaches
-    boxes = np.empty((2 * n_leaves, 7))
-    level = padded.reshape(n_leaves, _LEAF, 7).max(axis=1)
+    padded[: len(centers), 6:] = extents
+    boxes = np.empty((2 * n_leaves, 9))
+    level = padded.reshape(n_leaves, _LEAF, 9).max(axis=1)
     while True:
         boxes[len(level) : 2 * len(level)] = level
         if len(level) == 1:
@@ -145,17 +148,37 @@ def _class_boxes(centers: NDArray[np.float64], reaches: NDArray[np.float64]) -> 
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")
-def _box_distance(boxes, slot, x, y, z):
-    """Distance from a point to a slot's box; inf for an empty one."""
-    dx = max(boxes[slot, 0] - x, x - boxes[slot, 3], 0.0)
-    dy = max(boxes[slot, 1] - y, y - boxes[slot, 4], 0.0)
-    dz = max(boxes[slot, 2] - z, z - boxes[slot, 5], 0.0)
-    return np.sqrt(dx * dx + dy * dy + dz * dz)
+def _extents(discs, i):
+    """How far an ellipse extends from its centre along x, y and z."""
+    return (
+        np.sqrt(discs[i, 3] ** 2 + discs[i, 6] ** 2),
+        np.sqrt(discs[i, 4] ** 2 + discs[i, 7] ** 2),
+        np.sqrt(discs[i, 5] ** 2 + discs[i, 8] ** 2),
+    )
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")
-def _may_touch(discs, reaches, i, j, epsilon, limit):
-    """Whether the touch scale, in either direction, may be within the limit: the extents along the centre line."""
+def _box_bound(boxes, slot, discs, i, extents, epsilon):
+    """Least touch scale that any ellipse of a slot can have with this one, and squared distance to the slot's box.
+
+    Both inf for an empty slot.
+    """
+    dx = max(boxes[slot, 0] - discs[i, 0], discs[i, 0] - boxes[slot, 3], 0.0)
+    dy = max(boxes[slot, 1] - discs[i, 1], discs[i, 1] - boxes[slot, 4], 0.0)
+    dz = max(boxes[slot, 2] - discs[i, 2], discs[i, 2] - boxes[slot, 5], 0.0)
+    squared = dx * dx + dy * dy + dz * dz
+    if squared == np.inf:
+        return np.inf, np.inf
+    # The floor stands for extents that vanish, along the normal of an ellipse that lies along the axes.
+    x = (dx - epsilon) / max(extents[0] + boxes[slot, 6], 1e-290)
+    y = (dy - epsilon) / max(extents[1] + boxes[slot, 7], 1e-290)
+    z = (dz - epsilon) / max(extents[2] + boxes[slot, 8], 1e-290)
+    return max(x, y, z) * (1.0 - 1e-12), squared
+
+
+@nb.njit(nogil=True, cache=True, error_model="numpy")
+def _may_touch_one_way(discs, reaches, i, j, epsilon, limit):
+    """Whether the touch scale in at least one direction may be within the limit: the extents along the centre line."""
     x, y, z = discs[j, 0] - discs[i, 0], discs[j, 1] - discs[i, 1], discs[j, 2] - discs[i, 2]
     squared = x * x + y * y + z * z
     # The factor allows for rounding: a pair at the limit must be looked at from both of its ends.
@@ -180,18 +203,28 @@ def _may_meet(discs, i, j, epsilon, limit):
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")
+def may_touch(discs, reaches, i, j, epsilon, limit):
+    """Whether the touch scale may be within the limit: bounds that cost a fraction of it."""
+    return (
+        _may_touch_one_way(discs, reaches, i, j, epsilon, limit)
+        and _may_meet(discs, i, j, epsilon, limit)
+        and _may_meet(discs, j, i, epsilon, limit)
+    )
+
+
+@nb.njit(nogil=True, cache=True, parallel=True, error_model="numpy")
 def nearest_touches(
     queries, nodes, discs, reaches, classes, boxes, labels, ranges, epsilon, limit, ratio, partners, scales
 ):
     """Find, for some ellipses, the others with the smallest touch scales.
 
     Depth first, nearer box first; the search radius shrinks with the worst
-    partner found so far.
+    partner found so far. Runs in parallel, a block of queries at a time.
 
     Parameters
     ----------
     queries : (Q,) int64
-        Places in the sorted order.
+        Places in the sorted order, ascending.
     nodes, discs, reaches, classes, boxes
         Arrays of `EllipseTree`.
     labels : (n,) int32
@@ -210,59 +243,89 @@ def nearest_touches(
         Filled with their touch scales, inf where there are fewer.
     """
     m = partners.shape[1]
-    stack = np.empty(128, np.int64)
-    gaps = np.empty(128)
-    for q in range(len(queries)):
-        me = queries[q]
-        reach, label = reaches[me], labels[me]
-        x, y, z = discs[me, 0], discs[me, 1], discs[me, 2]
-        for k in range(m):
-            partners[q, k], scales[q, k] = -1, np.inf
-        own = 0
-        while classes[own, 1] <= me:
-            own += 1
-        # Its own class first: there are the best partners, which narrow the search among the others.
-        for step in range(len(classes)):
-            first, end, base, n_leaves = classes[(own + step) % len(classes)]
-            stack[0], gaps[0], height = 1, _box_distance(boxes, base + 1, x, y, z), 1
-            while height > 0:
-                height -= 1
-                slot = stack[height]
-                worst = min(limit, scales[q, m - 1])
-                if gaps[height] > worst * (reach + boxes[base + slot, 6]) + epsilon:
-                    continue
-                if ranges[base + slot, 0] == label and ranges[base + slot, 1] == label:
-                    continue
-                if slot < n_leaves:
-                    left, right = 2 * slot, 2 * slot + 1
-                    a = _box_distance(boxes, base + left, x, y, z)
-                    b = _box_distance(boxes, base + right, x, y, z)
-                    if a < b:
-                        left, right, a, b = right, left, b, a
-                    stack[height], gaps[height] = left, a
-                    stack[height + 1], gaps[height + 1] = right, b
-                    height += 2
-                    continue
-                start = first + (slot - n_leaves) * _LEAF
-                for other in range(start, min(start + _LEAF, end)):
+    for block in nb.prange((len(queries) + _BLOCK - 1) // _BLOCK):
+        stack = np.empty(128, np.int64)
+        bounds = np.empty(128)
+        start = block * _BLOCK
+        for q in range(start, min(start + _BLOCK, len(queries))):
+            me = queries[q]
+            reach, label = reaches[me], labels[me]
+            extents = _extents(discs, me)
+            for k in range(m):
+                partners[q, k], scales[q, k] = -1, np.inf
+            own = 0
+            while classes[own, 1] <= me:
+                own += 1
+            # Its own class first: there are the best partners, which narrow the search among the others.
+            for step in range(len(classes)):
+                first, end, base, n_leaves = classes[(own + step) % len(classes)]
+                stack[0], bounds[0], height = 1, 0.0, 1
+                while height > 0:
+                    height -= 1
+                    slot = stack[height]
                     worst = min(limit, scales[q, m - 1])
-                    if labels[other] == label or reaches[other] > ratio * reach:
+                    if bounds[height] > worst:
                         continue
-                    if not _may_touch(discs, reaches, me, other, epsilon, worst):
+                    if ranges[base + slot, 0] == label and ranges[base + slot, 1] == label:
                         continue
-                    if not (
-                        _may_meet(discs, me, other, epsilon, worst) and _may_meet(discs, other, me, epsilon, worst)
-                    ):
+                    if slot < n_leaves:
+                        left, right = 2 * slot, 2 * slot + 1
+                        f_left, a = _box_bound(boxes, base + left, discs, me, extents, epsilon)
+                        f_right, b = _box_bound(boxes, base + right, discs, me, extents, epsilon)
+                        if a < b:
+                            left, right, f_left, f_right = right, left, f_right, f_left
+                        if f_left <= worst:
+                            stack[height], bounds[height] = left, f_left
+                            height += 1
+                        if f_right <= worst:
+                            stack[height], bounds[height] = right, f_right
+                            height += 1
                         continue
-                    f = two_way_touch(discs, me, other, epsilon, worst)
-                    node = nodes[other]
-                    if f > worst or (f == scales[q, m - 1] and node > partners[q, m - 1]):
-                        continue
-                    k = m - 1
-                    while k > 0 and (scales[q, k - 1] > f or (scales[q, k - 1] == f and partners[q, k - 1] > node)):
-                        scales[q, k], partners[q, k] = scales[q, k - 1], partners[q, k - 1]
-                        k -= 1
-                    scales[q, k], partners[q, k] = f, node
+                    leaf = first + (slot - n_leaves) * _LEAF
+                    for other in range(leaf, min(leaf + _LEAF, end)):
+                        worst = min(limit, scales[q, m - 1])
+                        if labels[other] == label or reaches[other] > ratio * reach:
+                            continue
+                        if not may_touch(discs, reaches, me, other, epsilon, worst):
+                            continue
+                        f = -1.0
+                        if queries[start] <= other < me and reach <= ratio * reaches[other]:
+                            f = _found_before(queries, start, q, other, nodes[me], partners, scales)
+                        if f < 0.0:
+                            f = two_way_touch(discs, me, other, epsilon, worst)
+                        if f <= worst:
+                            _insert(partners, scales, q, nodes[other], f)
+
+
+@nb.njit(nogil=True, cache=True, error_model="numpy")
+def _found_before(queries, start, q, other, node, partners, scales):
+    """What the finished search of an earlier place of the block says about its touch scale with a node.
+
+    The touch scale if it listed the node; inf if it turned it down for so many better ones that it is no better here
+    than the worst at hand, or because it exceeds the limit; -1 if it says nothing.
+    """
+    # The block's places ascend, so this one is at most as many rows back as it is places back.
+    row = q - (queries[q] - other)
+    if row < start or queries[row] != other:
+        return -1.0
+    m = partners.shape[1]
+    for k in range(m):
+        if partners[row, k] == node:
+            return scales[row, k]
+    worst = scales[row, m - 1]
+    return np.inf if worst == np.inf or worst > scales[q, m - 1] else -1.0
+
+
+@nb.njit(nogil=True, cache=True, error_model="numpy")
+def _insert(partners, scales, q, node, f):
+    """Put a contact into a row ordered by touch scale, then node, if it is better than the last."""
+    k = partners.shape[1] - 1
+    if f > scales[q, k] or (f == scales[q, k] and node > partners[q, k]):
+        return
+    while k > 0 and (scales[q, k - 1] > f or (scales[q, k - 1] == f and partners[q, k - 1] > node)):
+        scales[q, k], partners[q, k] = scales[q, k - 1], partners[q, k - 1]
+        k -= 1
+    scales[q, k], partners[q, k] = f, node
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")
@@ -289,8 +352,7 @@ def offset_pairs(start, nodes, discs, reaches, classes, boxes, epsilon, pairs):
     stack = np.empty(128, np.int64)
     count = 0
     for me in range(start, len(discs)):
-        reach, complete = reaches[me], count
-        x, y, z = discs[me, 0], discs[me, 1], discs[me, 2]
+        complete, extents = count, _extents(discs, me)
         for c in range(len(classes)):
             first, end, base, n_leaves = classes[c]
             if first >= me:
@@ -299,7 +361,7 @@ def offset_pairs(start, nodes, discs, reaches, classes, boxes, epsilon, pairs):
             while height > 0:
                 height -= 1
                 slot = stack[height]
-                if _box_distance(boxes, base + slot, x, y, z) > reach + boxes[base + slot, 6] + epsilon:
+                if _box_bound(boxes, base + slot, discs, me, extents, epsilon)[0] > 1.0:
                     continue
                 if slot < n_leaves:
                     stack[height], stack[height + 1] = 2 * slot, 2 * slot + 1
@@ -307,7 +369,7 @@ def offset_pairs(start, nodes, discs, reaches, classes, boxes, epsilon, pairs):
                     continue
                 leaf = first + (slot - n_leaves) * _LEAF
                 for other in range(leaf, min(leaf + _LEAF, end, me)):
-                    if not _may_touch(discs, reaches, me, other, epsilon, 1.0):
+                    if not _may_touch_one_way(discs, reaches, me, other, epsilon, 1.0):
                         continue
                     if (
                         one_way_touch(discs, me, other, epsilon, 1.0) > 1.0

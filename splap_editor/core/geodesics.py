@@ -11,6 +11,7 @@ from splap_editor.core.progress import Progress, no_progress
 from splap_editor.core.splat_graph import SplatGraph
 
 _CHUNK = 16384
+_BLOCK = 512
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,18 +67,19 @@ def geodesic_neighbors(
     """
     if k < 1:
         raise ValueError(f"k must be at least 1, got {k}")
-    n = graph.n_nodes
-    settled = np.full(n, np.inf)
+    sources = np.arange(graph.n_nodes) if nodes is None else np.ascontiguousarray(nodes, np.int64)
+    tentative = np.full((nb.get_num_threads(), graph.n_nodes), np.inf)
     counts = [np.empty(0, np.int32)]
     indices, distances = [np.empty(0, np.int32)], [np.empty(0)]
-    for start, end in node_runs(n, nodes, _CHUNK):
-        near, far = np.empty((end - start, k), np.int32), np.empty((end - start, k))
-        counts.append(np.zeros(end - start, np.int32))
-        _nearest(start, graph.indptr, graph.indices, graph.lengths, settled, near, far, counts[-1])
+    for start in range(0, len(sources), _CHUNK):
+        chunk = sources[start : start + _CHUNK]
+        near, far = np.empty((len(chunk), k), np.int32), np.empty((len(chunk), k))
+        counts.append(np.zeros(len(chunk), np.int32))
+        _nearest(chunk, graph.indptr, graph.indices, graph.lengths, tentative, near, far, counts[-1])
         found = np.arange(k) < counts[-1][:, None]
         indices.append(near[found])
         distances.append(far[found])
-        progress(end / n)
+        progress((start + len(chunk)) / len(sources))
     indptr = np.concatenate([[0], np.cumsum(np.concatenate(counts))]).astype(np.int32)
     return Neighborhoods(indptr, np.concatenate(indices), np.concatenate(distances))
 
@@ -218,41 +220,50 @@ def _drop_first(heap_keys, heap_nodes, size):
     heap_keys[i], heap_nodes[i] = key, node
 
 
-@nb.njit(nogil=True, cache=True)
-def _nearest(first, indptr, indices, lengths, tentative, near, far, counts):
-    """Truncated Dijkstra from nodes ``first``, ``first + 1`` …: rows of the k nearest and how many there are.
+@nb.njit(nogil=True, cache=True, parallel=True)
+def _nearest(sources, indptr, indices, lengths, tentative, near, far, counts):
+    """Truncated Dijkstra from each of some nodes: rows of the k nearest and how many there are.
 
-    ``tentative`` is inf everywhere, before and after. In Morton order the part of it one search touches
-    stays in the processor's cache, which makes a plain array faster than a hash table.
+    ``tentative`` has a row per thread that is inf everywhere, before and after. In Morton order the part of it one
+    search touches stays in the processor's cache, which makes a plain array faster than a hash table.
     """
-    k = near.shape[1]
-    heap_keys, heap_nodes = np.empty(1024), np.empty(1024, np.int32)
-    for row in range(len(near)):
-        source = first + row
-        tentative[source] = 0.0
-        heap_keys[0], heap_nodes[0], size, found = 0.0, source, 1, -1
-        while size > 0:
-            distance, node = heap_keys[0], heap_nodes[0]
-            size -= 1
-            _drop_first(heap_keys, heap_nodes, size)
-            if distance > tentative[node]:
-                continue
-            if found >= 0:
-                near[row, found], far[row, found] = node, distance
-            found += 1
-            if found == k:
-                break
-            for e in range(indptr[node], indptr[node + 1]):
-                other, reached = indices[e], distance + lengths[e]
-                if reached < tentative[other]:
-                    tentative[other] = reached
-                    heap_keys, heap_nodes = _push(heap_keys, heap_nodes, size, reached, other)
-                    size += 1
-        counts[row] = found
-        # What the search touched is the source, what it settled, and the neighbours of all but the last of these.
-        _forget(source, indptr, indices, tentative)
-        for i in range(found):
-            _forget(near[row, i], indptr, indices, tentative)
+    for block in nb.prange((len(near) + _BLOCK - 1) // _BLOCK):
+        best = tentative[nb.get_thread_id()]
+        heap_keys, heap_nodes = np.empty(1024), np.empty(1024, np.int32)
+        for row in range(block * _BLOCK, min((block + 1) * _BLOCK, len(near))):
+            heap_keys, heap_nodes = _search(
+                sources[row], indptr, indices, lengths, best, heap_keys, heap_nodes, near[row], far[row], counts[row:]
+            )
+
+
+@nb.njit(nogil=True, cache=True)
+def _search(source, indptr, indices, lengths, tentative, heap_keys, heap_nodes, near, far, count):
+    """One truncated Dijkstra; returns the heap's arrays, which may have grown."""
+    tentative[source] = 0.0
+    heap_keys[0], heap_nodes[0], size, found = 0.0, source, 1, -1
+    while size > 0:
+        distance, node = heap_keys[0], heap_nodes[0]
+        size -= 1
+        _drop_first(heap_keys, heap_nodes, size)
+        if distance > tentative[node]:
+            continue
+        if found >= 0:
+            near[found], far[found] = node, distance
+        found += 1
+        if found == len(near):
+            break
+        for e in range(indptr[node], indptr[node + 1]):
+            other, reached = indices[e], distance + lengths[e]
+            if reached < tentative[other]:
+                tentative[other] = reached
+                heap_keys, heap_nodes = _push(heap_keys, heap_nodes, size, reached, other)
+                size += 1
+    count[0] = found
+    # What the search touched is the source, what it settled, and the neighbours of all but the last of these.
+    _forget(source, indptr, indices, tentative)
+    for i in range(found):
+        _forget(near[i], indptr, indices, tentative)
+    return heap_keys, heap_nodes
 
 
 @nb.njit(nogil=True, cache=True)

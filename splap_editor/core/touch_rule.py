@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from splap_editor.core.ellipse_offset import two_way_touch
-from splap_editor.core.ellipse_tree import EllipseTree, nearest_touches
+from splap_editor.core.ellipse_tree import EllipseTree, may_touch, nearest_touches
 from splap_editor.core.progress import Progress, part_of
 
 N_PARTNERS = 6
@@ -79,8 +79,11 @@ def touch_edges(tree: EllipseTree, epsilon: float, progress: Progress) -> tuple[
         tree, everything, everything, epsilon, 1.0, PEER_RATIO, _SHORT_LIST, part_of(progress, 0.0, 0.8)
     )
     near = _mutual(tree, partners[:, :N_NEAR], scales[:, :N_NEAR])
-    _pass_over_redundant(tree.discs, tree.places, epsilon, REDUNDANCY, partners, scales)
-    edges, touch = _mutual(tree, partners[:, :N_PARTNERS], scales[:, :N_PARTNERS])
+    kept, kept_scales = np.empty((n, N_PARTNERS), np.int32), np.empty((n, N_PARTNERS))
+    _pass_over_redundant(
+        tree.discs, tree.reaches, tree.places, epsilon, REDUNDANCY, partners, scales, kept, kept_scales
+    )
+    edges, touch = _mutual(tree, kept, kept_scales)
     labels = connected_components(_adjacency(edges, n), directed=False)[1]
     labels, more, more_touch = _joined(tree, labels, epsilon, 1.0, n, part_of(progress, 0.8, 0.9))
     _, last, last_touch = _joined(tree, labels, epsilon, FRAGMENT_REACH, FRAGMENT_SIZE, part_of(progress, 0.9, 1.0))
@@ -88,26 +91,30 @@ def touch_edges(tree: EllipseTree, epsilon: float, progress: Progress) -> tuple[
     return _closed(edges, touch, *near, n)
 
 
-@nb.njit(nogil=True, cache=True, error_model="numpy")
-def _pass_over_redundant(discs, places, epsilon, redundancy, partners, scales):
-    """Take out of each place's contacts those whose partner nearly coincides with a better one's; close the gaps."""
+@nb.njit(nogil=True, cache=True, parallel=True, error_model="numpy")
+def _pass_over_redundant(discs, reaches, places, epsilon, redundancy, partners, scales, kept, kept_scales):
+    """Copy each place's contacts, except those whose partner nearly coincides with a better one's."""
     n, m = partners.shape
-    for place in range(n):
-        kept = 0
+    for place in nb.prange(n):
+        count = 0
         for a in range(m):
-            node, f = partners[place, a], scales[place, a]
-            partners[place, a], scales[place, a] = -1, np.inf
-            if node < 0:
+            if count == kept.shape[1] or partners[place, a] < 0:
                 break
+            other, limit = places[partners[place, a]], redundancy * scales[place, a]
             redundant = False
-            for b in range(kept):
-                near = two_way_touch(discs, places[partners[place, b]], places[node], epsilon, redundancy * f)
-                if near < redundancy * f:
+            for b in range(count):
+                better = places[kept[place, b]]
+                if (
+                    may_touch(discs, reaches, other, better, epsilon, limit)
+                    and two_way_touch(discs, other, better, epsilon, limit) < limit
+                ):
                     redundant = True
                     break
             if not redundant:
-                partners[place, kept], scales[place, kept] = node, f
-                kept += 1
+                kept[place, count], kept_scales[place, count] = partners[place, a], scales[place, a]
+                count += 1
+        for a in range(count, kept.shape[1]):
+            kept[place, a], kept_scales[place, a] = -1, np.inf
 
 
 def _mutual(
@@ -177,7 +184,9 @@ def _closed(
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
     """Edges, and those of the ``near`` contacts whose ends share a neighbour, round by round."""
     for _ in range(_CLOSING_ROUNDS):
-        left = ~np.isin(edge_keys(near, n_nodes), edge_keys(edges, n_nodes))
+        keys, near_keys = np.sort(edge_keys(edges, n_nodes)), edge_keys(near, n_nodes)
+        at = np.minimum(np.searchsorted(keys, near_keys), max(len(keys) - 1, 0))
+        left = keys[at] != near_keys if len(keys) else np.ones(len(near), bool)
         near, near_touch = near[left], near_touch[left]
         upper = _adjacency(edges, n_nodes)
         adjacency = (upper + upper.T).tocsr()
