@@ -40,7 +40,7 @@ class BbwOptions:
 
     blending: Literal["dual-quaternion", "linear"] = "dual-quaternion"
     tolerance: float = 2e-4
-    max_factorisations: int = 40
+    max_factorisations: int = 60
     mass_floor: float = 0.1
     speck_size: int = 30
 

@@ -14,6 +14,17 @@ from splap_editor.core.progress import Progress, no_progress
 # large and far too small for dozens of factorisations. One half makes the violation fall about twofold a step.
 ACTIVATION_SHARE = 0.5
 
+# A held pocket is let go one layer a factorisation, since only its rim feels a pull; layers that hang on by weak links
+# move so little that the steps can fall below the tolerance before the pocket is open. Once so many factorisations in
+# a row have done nothing but let go (violations this share of the tolerance or less), the start held too much, and
+# it is cheaper and safer to begin again with everything free.
+STALLED_FACTORISATIONS = 3
+STALLED_SHARE = 0.05
+
+# Deep inside a wrongly held pocket there is no pull at all. Before small steps are believed, all that is not clearly
+# held (one coordinate step would not leave the box by so much) is let go once.
+CLEARLY_HELD = 1e-9
+
 
 @dataclass(frozen=True)
 class BoxQpReport:
@@ -67,7 +78,7 @@ def box_qp(
     *,
     start: NDArray[np.int8] | None = None,
     tolerance: float = 1e-9,
-    max_factorisations: int = 40,
+    max_factorisations: int = 60,
     progress: Progress = no_progress,
 ) -> BoxQpSolution:
     """Minimise ``½ wᵀA w + cᵀw`` over ``lower ≤ w ≤ upper``.
@@ -75,7 +86,8 @@ def box_qp(
     A primal-dual active set [1]_: solve with the active unknowns held on their bounds, let go of those that
     their multiplier pulls inwards, hold those that left the box, repeat. It stops when the set repeats itself, or
     when both the last step and the bound violation are within ``tolerance`` (a small violation alone says nothing: a
-    set that holds far too many unknowns violates no bound). Past ``max_factorisations`` the interior-point solver
+    set that holds far too many unknowns violates no bound). A start that turns out to hold too much is dropped once,
+    in favour of all free. Past ``max_factorisations`` the interior-point solver
     piqp takes over, and the report says so.
 
     Parameters
@@ -138,6 +150,10 @@ def _active_set_minimiser(A, c, lower, upper, start, tolerance, max_factorisatio
     """Run the active set; returns the last iterate, the factorisations spent and whether it settled."""
     active = np.zeros(len(c), np.int8) if start is None else start.astype(np.int8)
     w = previous = None
+    diagonal = A.diagonal()
+    # All free is no guess that could hold too much.
+    was_checked = not active.any()
+    n_stalled = 0 if active.any() else -max_factorisations
     for k in range(max_factorisations):
         progress(1.0 - 0.8**k)
         held = np.where(active < 0, lower, np.where(active > 0, upper, 0.0))
@@ -155,8 +171,19 @@ def _active_set_minimiser(A, c, lower, upper, start, tolerance, max_factorisatio
         settled = np.where(active * gradient > 0, 0, active)
         leaving = (outside > 0) & (outside >= ACTIVATION_SHARE * violation) & (active == 0)
         settled = np.where(leaving, np.where(w < lower, -1, 1), settled).astype(np.int8)
-        if np.array_equal(settled, active) or (step <= tolerance and violation <= tolerance):
+        if np.array_equal(settled, active):
             return w, k + 1, True
+        if step <= tolerance and violation <= tolerance:
+            clearly_held = np.where(active * gradient < -CLEARLY_HELD * diagonal, active, 0).astype(np.int8)
+            if was_checked or np.array_equal(clearly_held, active):
+                return w, k + 1, True
+            was_checked = True
+            active = clearly_held
+            continue
+        n_stalled = n_stalled + 1 if n_stalled < 0 or violation <= STALLED_SHARE * tolerance else 0
+        if n_stalled == STALLED_FACTORISATIONS and k < max_factorisations // 3:
+            settled = np.zeros_like(active)
+            n_stalled = -max_factorisations
         active = settled
     return w, max_factorisations, False
 

@@ -104,3 +104,21 @@ def test_rejects_crossed_bounds_and_wrong_shapes():
         box_qp(A, c, upper + 1, lower)
     with pytest.raises(ValueError, match="must agree"):
         box_qp(A, c[:-1], lower, upper)
+
+
+def test_a_start_that_holds_far_too_much_is_dropped():
+    """A bar that hangs on by weak links: the pocket held at the start must open although each layer moves little."""
+    n = 400
+    stiffness = np.where(np.arange(n - 1) % 40 == 39, 1e-4, 1.0)
+    L = sp.diags_array([-stiffness, -stiffness], offsets=[-1, 1], shape=(n, n)).tocsr()
+    L = sp.csr_array(L - sp.diags_array(L.sum(axis=1)))
+    energy = sp.csr_array(L.T @ L + 1e-12 * sp.eye_array(n))
+    unknowns = np.arange(2, n - 2)
+    A, c = energy[unknowns][:, unknowns], energy[unknowns][:, [0, 1]].sum(axis=1)
+    start = np.zeros(n - 4, np.int8)
+    start[60:] = -1
+    bounds = np.zeros(n - 4), np.ones(n - 4)
+    exact = box_qp(A, c, *bounds, tolerance=1e-10)
+    rough = box_qp(A, c, *bounds, start=start, tolerance=2e-4)
+    assert not rough.report.fallback
+    assert np.abs(rough.w - exact.w).max() < 2e-3
