@@ -67,6 +67,16 @@ class StageCache:
         self._evict(keep=path)
         return True
 
+    @property
+    def nbytes(self) -> int:
+        """Size of all entries on disk, in bytes."""
+        return sum(size for _, size, _ in self._entries())
+
+    def set_max_bytes(self, max_bytes: int) -> None:
+        """Change the bound; what no longer fits goes at once."""
+        self.max_bytes = max_bytes
+        self._evict()
+
     def clear(self) -> None:
         """Drop every entry."""
         for path in self.folder.glob("*.npz"):
@@ -75,7 +85,7 @@ class StageCache:
     def _path(self, key: str) -> Path:
         return self.folder / f"{key}.npz"
 
-    def _evict(self, keep: Path) -> None:
+    def _entries(self) -> list[tuple[float, int, Path]]:
         entries = []
         for path in self.folder.glob("*.npz"):
             try:
@@ -83,6 +93,10 @@ class StageCache:
             except OSError:
                 continue  # another process dropped it meanwhile
             entries.append((stat.st_mtime, stat.st_size, path))
+        return entries
+
+    def _evict(self, keep: Path | None = None) -> None:
+        entries = self._entries()
         total = sum(size for _, size, _ in entries)
         for _, size, path in sorted(entries, key=lambda entry: entry[0]):
             if total <= self.max_bytes:

@@ -115,6 +115,14 @@ class History:
         self._saved = 0
         self.changed.emit()
 
+    def set_max_bytes(self, max_bytes: int) -> None:
+        """Change the bound; the oldest steps that no longer fit are forgotten at once."""
+        self.max_bytes = max_bytes
+        before = len(self._commands)
+        self._forget_oldest()
+        if len(self._commands) != before:
+            self.changed.emit()
+
     def _forget_oldest(self) -> None:
         kept = self.nbytes
         while kept > self.max_bytes and self._cursor > 1:

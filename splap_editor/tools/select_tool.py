@@ -57,6 +57,7 @@ class SelectTool:
         self._path: list[tuple[float, float]] = []
         self._before: NDArray[np.bool_] | None = None
         self._screen: NDArray[np.float32] | None = None
+        self._orbits = False
         self._navigating = False
 
     @property
@@ -113,6 +114,9 @@ class SelectTool:
     def _begin(self, event: PointerEvent) -> None:
         scene, viewport = self._context.session.scene, self._context.viewport
         self._path = [event.xy]
+        self._orbits = (
+            self._context.left_orbits and self.options.shape == "rectangle" and not (event.shift or event.ctrl)
+        )
         self._before = scene.selection
         if self.options.shape == "brush":
             self._screen = viewport.screen_points()
@@ -126,7 +130,7 @@ class SelectTool:
                 self._context.hud.show(circle=(*event.xy, self.options.brush_px))
             return False
         last = self._path[-1]
-        if self.options.shape == "click":
+        if self.options.shape == "click" or self._orbits:
             if np.hypot(event.xy[0] - last[0], event.xy[1] - last[1]) > CLICK_SLACK_PX:
                 self._forget()
                 self._navigating = True

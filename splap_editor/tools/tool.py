@@ -94,12 +94,16 @@ class Hud:
 
 @dataclass(eq=False)
 class ToolContext:
-    """What every tool works on; ``navigate`` takes over a drag that turns out to be one of the camera."""
+    """What every tool works on; ``navigate`` takes over a drag that turns out to be one of the camera.
+
+    With ``left_orbits`` a left drag without Shift or Ctrl is one, except where it draws.
+    """
 
     session: Session
     viewport: Viewport
     hud: Hud = field(default_factory=Hud)
     navigate: "Tool | None" = None
+    left_orbits: bool = False
 
 
 class Tool(Protocol):

@@ -175,6 +175,23 @@ ACTIONS: tuple[ActionSpec, ...] = (
         breaks=True,
     ),
     A("graph.clear_mends", "Clear &mends", (), "", "Take every cut and every added edge back.", "mends", "&Graph"),
+    A(
+        "program.palette",
+        "&Find an action…",
+        ("Ctrl+Shift+P",),
+        "",
+        "Type a few letters of what you want to do.",
+        menu="&Help",
+    ),
+    A(
+        "program.preferences",
+        "Pre&ferences…",
+        ("Ctrl+,",),
+        "",
+        "Mouse, memory, threads and disk space.",
+        menu="&Edit",
+        breaks=True,
+    ),
     A("help.sheet", "&Keys and gestures", ("F1",), "help", "Everything the mouse and keyboard do.", menu="&Help"),
     A("help.about", "&About SpLap Editor", (), "", "Version, licence and the paper.", menu="&Help"),
 )

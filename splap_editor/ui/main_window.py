@@ -39,6 +39,8 @@ from splap_editor.ui.panels.scene_panel import ScenePanel
 from splap_editor.ui.panels.section import Section
 from splap_editor.ui.picture_dialog import PictureDialog
 from splap_editor.ui.pose_commands import PoseCommands
+from splap_editor.ui.preferences import PreferenceStore
+from splap_editor.ui.program_commands import ProgramCommands
 from splap_editor.ui.recovery_bar import RecoveryBar
 from splap_editor.ui.selection_sets_menu import SelectionSetsMenu
 from splap_editor.ui.state_line import StateLine
@@ -120,6 +122,7 @@ class MainWindow(FileDrop, QMainWindow):
         self.dock = QDockWidget()
         self.dock.setObjectName("panels")
         self.actions_ = self._actions()
+        self.program.actions = self.actions_
         self.inspection.set_actions(self.actions_)
         menus = fill_menu_bar(self.menuBar(), self.actions_)
         menus["&Select"].insertMenu(self.actions_["select.through"], self.selection_sets)
@@ -169,9 +172,11 @@ class MainWindow(FileDrop, QMainWindow):
         self.timeline_commands = TimelineCommands(self, session, view.viewport, self.toast)
         self.recovery_bar = RecoveryBar(self.autosave, self.files.leave_edit)
         self.view_commands = ViewCommands(session, view, self, self.dock)
+        self.program = ProgramCommands(self, PreferenceStore(session, view, tools.context))
         return ActionSet(
             self,
             {
+                "program": self.program,
                 "file": self.files,
                 "document": saving,
                 "timeline": self.timeline_commands,

@@ -115,6 +115,7 @@ class SceneView:
         self._session = session
         self._scene: Scene | None = None
         self._depicted: Depiction | None = None
+        self.preferred_up: tuple[float, float, float] | None = None
         self._shows_tints = True
         self._tinted_for: tuple[object, ...] = ()
         self._paints: dict[str, NDArray[np.uint8]] = {}
@@ -204,7 +205,7 @@ class SceneView:
         scene.active_handles_changed.connect(self._show_handles)
         self._depicted = scene.depicted if scene.depicted is not None else depiction(scene.splats)
         self.viewport.splats.load(self._depicted.rest, self._depicted.colors)
-        self.viewport.camera.world_up = np.array(suggested_up(scene.splats))
+        self.viewport.camera.world_up = np.array(self.preferred_up or suggested_up(scene.splats))
         self.viewport.reset_camera()
         self._show_flags()
         self._show_handles()

@@ -82,3 +82,14 @@ def test_keys_tell_values_dtypes_shapes_and_order_apart():
     parts = [[a], [a.astype(np.float32)], [a.reshape(2, 2)], [a, 1], [1, a], [a + 1], ["1", a]]
     assert len({content_key(part) for part in parts}) == len(parts)
     assert content_key([a, 1]) == content_key([a.copy(), 1])
+
+
+def test_a_tighter_bound_counts_at_once(tmp_path):
+    cache = StageCache(tmp_path)
+    for k in range(3):
+        cache.store(f"entry{k}", {"a": np.zeros(1000)})
+    one = cache.nbytes // 3
+    cache.set_max_bytes(2 * one + 10)
+    assert cache.nbytes == 2 * one
+    cache.clear()
+    assert cache.nbytes == 0

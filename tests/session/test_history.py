@@ -99,3 +99,14 @@ def test_every_change_is_told():
     history.mark_saved()
     history.clear()
     assert len(told) == 5
+
+
+def test_a_tighter_bound_forgets_the_oldest_steps_at_once():
+    box, history, told = [0], History(), []
+    for amount in (1, 2, 4):
+        history.push(Add(box, amount))
+    history.changed.connect(lambda: told.append(history.nbytes))
+    history.set_max_bytes(20)
+    assert history.nbytes == 20 and told == [20]
+    assert history.undo() and history.undo() and not history.undo()
+    assert box == [1]
