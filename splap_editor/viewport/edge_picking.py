@@ -46,20 +46,27 @@ def edge_under(
     """
     if not len(edges):
         return None
-    rows, places = np.unique(np.asarray(edges), return_inverse=True)
-    pixels = projection.pixels(np.asarray(positions)[rows])[places.reshape(-1, 2)]
-    start, step = pixels[:, 0], pixels[:, 1] - pixels[:, 0]
+    edges, positions = np.asarray(edges), np.asarray(positions)
+    if 2 * len(edges) < len(positions):
+        pixels = projection.pixels(positions[edges].reshape(-1, 3)).reshape(-1, 2, 2)
+    else:
+        pixels = projection.pixels(positions)[edges]
+    # Most edges are nowhere near; what follows is for the few whose box holds the pixel.
+    ends = pixels[:, 0], pixels[:, 1]
+    reached = (np.minimum(*ends) <= np.add(xy, reach_px)) & (np.maximum(*ends) >= np.subtract(xy, reach_px))
+    near = np.flatnonzero(reached.all(axis=1))
+    if not len(near):
+        return None
+    start, step = pixels[near, 0], pixels[near, 1] - pixels[near, 0]
     to = np.asarray(xy) - start
-    square = np.einsum("ij,ij->i", step, step)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        t = np.clip(np.einsum("ij,ij->i", to, step) / square, 0.0, 1.0)
+    square = np.maximum(np.einsum("ij,ij->i", step, step), 1e-12)
+    t = np.clip(np.einsum("ij,ij->i", to, step) / square, 0.0, 1.0)
     away = np.linalg.norm(to - t[:, None] * step, axis=1)
     ends = np.minimum(np.linalg.norm(to, axis=1), np.linalg.norm(to - step, axis=1))
     away[~((away <= reach_px) & (ends > np.minimum(END_PX, END_SHARE * np.sqrt(square))))] = np.inf
     if np.isfinite(depth):
-        near = np.flatnonzero(np.isfinite(away))
-        depths = projection.depths(np.asarray(positions)[np.asarray(edges)[near]].reshape(-1, 3)).reshape(-1, 2)
-        at = depths[:, 0] + t[near] * (depths[:, 1] - depths[:, 0])
-        away[near[at > depth + _DEPTH_SLACK * extent]] = np.inf
+        depths = projection.depths(positions[edges[near]].reshape(-1, 3)).reshape(-1, 2)
+        at = depths[:, 0] + t * (depths[:, 1] - depths[:, 0])
+        away[at > depth + _DEPTH_SLACK * extent] = np.inf
     nearest = int(np.argmin(away))
-    return nearest if np.isfinite(away[nearest]) else None
+    return int(near[nearest]) if np.isfinite(away[nearest]) else None

@@ -20,7 +20,8 @@ EDGE_COLORS = {"length": "Length", "offset": "Offset δ", "component": "Componen
 """What edges are coloured by, and words for it."""
 
 SHOWN = ("off", "near", "all")
-WIDTH_PX = 1.0
+WIDTHS_PX = {"near": 2.0, "all": 1.0}
+"""Width of edges: a few may be bold, many must leave room for each other."""
 _CHUNK = 32768
 
 
@@ -172,7 +173,8 @@ class GraphView:
             colors = made.colors[wanted]
         if lines is not None:
             if len(self.rows):
-                lines.show(self.rows, colors, WIDTH_PX)
+                width = WIDTHS_PX[self.options.shown] * self._view.viewport.gizmo.scale
+                lines.show(self.rows, colors, width)
             else:
                 lines.hide()
             self._view.viewport.request_render()

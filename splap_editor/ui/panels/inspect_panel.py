@@ -128,6 +128,8 @@ class InspectPanel(QWidget):
         self.toggle.setEnabled(scene.surface is not None)
         if not self._is_epsilon_typed:
             self.epsilon.show_value(100.0 * options.epsilon)
+        elif abs(self.epsilon.value() / 100.0 - options.epsilon) > 1e-9:
+            self._preview.ask(_at(options, self.epsilon.value() / 100.0))
         self._show_verdict()
 
     def _on_epsilon_committed(self, percent: float) -> None:
@@ -140,6 +142,10 @@ class InspectPanel(QWidget):
         if scene is None or rows is None or self._edge_part.isHidden():
             return
         epsilon = self.epsilon.value() / 100.0
+        is_other = abs(epsilon - scene.edit.graph.epsilon) > 1e-9
+        self.verdict.setVisible(is_other)
+        if not is_other:
+            return
         card = edge_card(scene.ellipses, rows, epsilon)
         touch = f"touch scale {_scale(card.touch)}" if scene.edit.graph.rule == "touch" else _gap_words(card)
         if self._preview.wanted != _at(scene.edit.graph, epsilon):

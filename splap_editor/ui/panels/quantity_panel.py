@@ -47,6 +47,8 @@ class QuantityPanel(QWidget):
         self.reset = QPushButton("Auto", toolTip="Leave the ends of the colours to the values")
         self.reset.setFlat(True)
         self.reset.clicked.connect(self.reset_range)
+        for combo in (self.choice, self.colormap):
+            combo.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         self._add_parts()
         view.changed.connect(self._show)
         session.scene_changed.connect(lambda: self.setEnabled(session.scene is not None))
