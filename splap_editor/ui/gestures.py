@@ -39,13 +39,6 @@ GESTURES: dict[str, tuple[tuple[str, str], ...]] = {
         ("Drag a diamond, Esc", "Move a key, drop it where it was"),
         ("Right click on a diamond", "Delete the key"),
     ),
-    "Inspect": (
-        ("Click a splat, a line", "Its card and neighbours, its edge"),
-        ("X", "Cut the edge"),
-        ("Esc", "Let go of the edge, then of the splat"),
-        ("Drag over the histogram", "Select by value; Shift adds, Ctrl removes"),
-        ("Drag the marks below it", "Ends of the colours; double click resets"),
-    ),
     "Look": (("Hold O", "Show the original"),),
     "Numbers": (("Drag a label sideways", "Change the number"),),
 }
