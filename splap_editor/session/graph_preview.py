@@ -5,6 +5,7 @@ from dataclasses import replace
 from splap_editor.core.splat_graph import GraphOptions, SplatGraph, splat_graph
 from splap_editor.session.jobs import REPORT_SECONDS, Job
 from splap_editor.session.latest_job import LatestJob
+from splap_editor.session.parallel_lock import alone
 from splap_editor.session.session import Session
 from splap_editor.session.signals import Signal
 
@@ -56,7 +57,8 @@ class GraphPreview:
                     told[0] = share
                     job.deliver(lambda: deliver(options, share))
 
-            return splat_graph(ellipses, options, progress=progress)
+            with alone(job.report):
+                return splat_graph(ellipses, options, progress=progress)
 
         self._job.ask(make, lambda graph: self._take(options, graph))
         self.changed.emit()

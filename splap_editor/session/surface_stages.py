@@ -67,9 +67,9 @@ def unmended(options: GraphOptions) -> GraphOptions:
 def plain_stages(ellipses: Ellipses, options: GraphOptions, timed: Timed, stages: StageProgress) -> SurfaceStages:
     """Make everything, without cut and added edges."""
     options = unmended(options)
-    with timed("graph"):
+    with timed("graph"), alone(stages("graph")):
         graph = splat_graph(ellipses, options, progress=stages("graph"))
-    with timed("geodesics"):
+    with timed("geodesics"), alone(stages("geodesics")):
         neighborhoods = geodesic_neighbors(graph, options.k, progress=stages("geodesics"))
     with timed("laplacian"):
         triangles = local_triangulations(ellipses, neighborhoods, progress=stages("laplacian"))
@@ -90,7 +90,8 @@ def mended_stages(
         graph = before.unmended if is_plain else mended_graph(ellipses, before.unmended, options)
         progress(0.2)
         ends = _changed_ends(ellipses, before.options, options)
-        neighborhoods, nodes = mended_neighborhoods(graph, before.neighborhoods, ends, options.k)
+        with alone(progress):
+            neighborhoods, nodes = mended_neighborhoods(graph, before.neighborhoods, ends, options.k)
         triangles = mended_triangulations(ellipses, neighborhoods, before.triangles, nodes)
         progress(0.5)
     with timed("laplacian"):
