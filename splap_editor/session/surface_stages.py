@@ -17,7 +17,6 @@ from splap_editor.core.progress import Progress
 from splap_editor.core.splat_graph import GraphOptions, SplatGraph, mended_graph, splat_graph
 from splap_editor.session.cache import Arrays
 from splap_editor.session.parallel_lock import alone
-from splap_editor.session.parallel_lock import alone
 
 
 class Timed(Protocol):
