@@ -63,6 +63,6 @@ def exported_file(
     """Write a file as it is posed."""
     job.report(0.1, "rotating colours")
     splats = file.splats if kernels is None else adapted_splats(file.splats, kernels)
-    job.report(0.5, "writing")
-    write_ply(path, file, splats, extra=columns_of(columns, snapshot), **options)
+    extra = columns_of(columns, snapshot)
+    write_ply(path, file, splats, extra=extra, progress=job.progress("writing"), **options)
     return export_report(path, file.splats, kernels)

@@ -1,5 +1,6 @@
 """A session as the window drives it, without the window."""
 
+import errno
 import queue
 import shutil
 import threading
@@ -12,7 +13,7 @@ import pytest
 from splap_editor.cli import main as command_line
 from splap_editor.io.ply import read_ply
 from splap_editor.resources import resource
-from splap_editor.session import surface_stages
+from splap_editor.session import surface_stages, work
 from splap_editor.session.cache import StageCache
 from splap_editor.session.edit import Pose
 from splap_editor.session.placement import disc_rows, held_pose, rows_region
@@ -247,6 +248,58 @@ def test_preparing_can_be_cancelled_and_resumed(main, session, monkeypatch):
     graph.go = True
     session.resume()
     main.run_until(lambda: session.state == "ready")
+
+
+def waits_until_cancelled(started, progress):
+    started.set()
+    while True:
+        progress(0.1)
+
+
+@pytest.mark.parametrize("kind", ["bind", "pose", "export"])
+def test_every_job_can_be_cancelled_and_leaves_everything_as_it_was(kind, main, opened, monkeypatch, tmp_path):
+    handle = bent(main, opened)
+    scene, started = opened.scene, threading.Event()
+    edit, kernels, kept = scene.edit, scene.kernels, sorted(opened.cache.folder.glob("*"))
+    out = tmp_path / "out.ply"
+    out.write_bytes(b"what was there")
+    if kind == "bind":
+        monkeypatch.setattr(
+            work, "deformer_of", lambda *args, progress, **more: waits_until_cancelled(started, progress)
+        )
+        opened.change_edit(replace(edit, method="bbw"), "Change method")
+    elif kind == "pose":
+        solve = lambda transforms, *, progress, shown: waits_until_cancelled(started, progress)  # noqa: E731
+        monkeypatch.setattr(opened.bound.deformer, "solve", solve)
+        opened.change_edit(edit.with_poses({handle.handle_id: Pose((0.1, 0.0, 0.0))}), "Move handle")
+    else:
+        monkeypatch.setattr(work, "write_ply", lambda *args, progress, **more: waits_until_cancelled(started, progress))
+        opened.export(out)
+    main.run_until(started.is_set)
+    opened.halt()
+    main.run_until(lambda: not opened.worker.is_busy())
+    assert opened.failures == [] and opened.state == "halted"
+    assert scene.kernels is kernels and sorted(opened.cache.folder.glob("*")) == kept
+    assert out.read_bytes() == b"what was there" and opened.has_unexported_edit
+    monkeypatch.undo()
+    opened.resume()
+    main.run_until(lambda: opened.state == "settled")
+
+
+def test_a_full_disk_is_said_and_the_old_file_stays(main, opened, monkeypatch, tmp_path):
+    bent(main, opened)
+    out = tmp_path / "out.ply"
+    out.write_bytes(b"what was there")
+
+    def full(*args, **more):
+        raise OSError(errno.ENOSPC, "No space left on device", str(out))
+
+    monkeypatch.setattr("splap_editor.io.atomic_file.os.replace", full)
+    opened.export(out)
+    main.run_until(lambda: opened.failures)
+    assert "space" in opened.failures[0].lower()
+    assert out.read_bytes() == b"what was there"
+    assert [path.name for path in tmp_path.iterdir() if path.is_file()] == ["out.ply"]
 
 
 def test_a_second_file_cancels_the_preparing_of_the_first(main, session, monkeypatch, tmp_path):
