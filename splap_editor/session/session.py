@@ -51,12 +51,11 @@ class Session:
         self.scene: Scene | None = None
         self.history = History()
         self.worker = Worker(post)
-        # Sorting and colouring for a turned view must not wait behind a scene that is being prepared.
+        # A turned view must not wait behind a scene being prepared, nor behind quantities, edges and previews.
         self.view_worker = Worker(post, name="splap-view")
-        # Nor behind quantities, edge colours and previews, which may take seconds.
         self.detail_worker = Worker(post, name="splap-detail")
         self.worker.on_progress = lambda job: self.job_changed.emit(job)
-        self.worker.on_busy = lambda job: self.job_changed.emit(job)
+        self.worker.on_busy = self._on_busy
         self.cache = cache
         self.n_threads = 4
         self.presenter: Presenter | None = None
@@ -75,6 +74,7 @@ class Session:
         self._pending_export: tuple[Path, tuple[str, ...], dict] | None = None
         self._exported_edit: Edit | None = None
         self._jobs: dict[str, tuple[Job, object]] = {}
+        self._told_job: Job | None = None
 
     # ------------------------------------------------------------------ files
 
@@ -191,14 +191,19 @@ class Session:
 
     def close(self) -> None:
         """Cancel everything and join the workers."""
-        self.worker.close()
-        self.view_worker.close()
-        self.detail_worker.close()
+        for worker in (self.worker, self.view_worker, self.detail_worker):
+            worker.close()
 
     @property
     def bound(self) -> BoundEdit | None:
         """The deformer in use, for read-outs such as weights and residuals."""
         return self._bound
+
+    def _on_busy(self, job: Job | None) -> None:
+        """Tell which job runs; frames of a drag, which have no title, come and go too fast to be told."""
+        if job is not self._told_job and (job is None or job.title):
+            self._told_job = job
+            self.job_changed.emit(job)
 
     def _advance(self) -> None:
         scene = self.scene
@@ -267,9 +272,7 @@ class Session:
         dragging = scene.preview is not None
         if self.awaits_drag:
             return
-        if not dragging and self._is_making(
-            "pose", lambda wanted: binds_like(wanted, edit) and poses_like(wanted, edit)
-        ):
+        if not dragging and self._is_making("pose", lambda made: binds_like(made, edit) and poses_like(made, edit)):
             return
         self.worker.cancel("pose")
         bound, surface, presenter, transforms = self._bound, scene.surface, self.presenter, edit.transforms
