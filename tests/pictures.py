@@ -93,6 +93,30 @@ class Person:
         shot.save(str(PICTURES / f"{name}.png"))
 
 
+def graph_pictures(person: Person) -> None:
+    """Show the graph over a bench, and two answers to who the neighbours of a splat are."""
+    window, session = person.window, person.session
+    session.open(resource("samples", "bench_2dgs.ply"))
+    run_until(lambda: session.scene is not None and session.scene.file.path.name == "bench_2dgs.ply")
+    person.settle()
+    means = np.asarray(session.scene.splats.means)
+    slats = (np.abs(means[:, 0] - 0.75) < 0.35) & (means[:, 2] > 0.45) & (means[:, 1] > 0.35)
+    camera = window.view.viewport.camera
+    camera.view = camera.look_from((-0.25, -1.0, 0.25))
+    camera.view = window.view.viewport.frame(np.flatnonzero(slats))
+    window.display.set(mode="ellipses")
+    window.inspection.graph_view.set(shown="all")
+    person.settle()
+    person.picture("graph", only_view=True)
+    window.inspection.graph_view.set(shown="off")
+    window.tools.choose("inspect")
+    window.inspection.inspected.set(kind="geodesic", other="euclidean", k=30)
+    near_gap = slats & (np.abs(means[:, 2] - 0.72) < 0.02)
+    person.click(person.pixel(np.median(means[near_gap], axis=0)))
+    person.settle()
+    person.picture("neighbors", only_view=True)
+
+
 def main() -> None:
     """Make every picture."""
     QSurfaceFormat.setDefaultFormat(surface_format())
@@ -125,6 +149,7 @@ def main() -> None:
     QTest.mouseRelease(window.viewport, Qt.MouseButton.LeftButton, pos=grip + QPoint(-110, 22))
     person.settle()
     person.picture("window")
+    graph_pictures(person)
     sys.stdout.flush()
     os._exit(0)  # Qt and VTK tear down in no promised order; the pictures are written
 

@@ -29,8 +29,8 @@ from splap_editor.core.handle_nodes import Region
 from splap_editor.io.sample_maker import big_scene, write_sample
 from splap_editor.session.cache import StageCache
 from splap_editor.session.edit import Pose
-from splap_editor.ui.viewport_widget import surface_format
 from splap_editor.ui.theme import apply_theme
+from splap_editor.ui.viewport_widget import surface_format
 from tests.benchmark.peers import machine, note, report, timed
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -74,7 +74,7 @@ class Heart:
         self._timer.start()
 
     def worst_ms(self) -> float:
-        """Longest block since the last call, in milliseconds; what the benchmark itself blocked before it does not count."""
+        """Longest block since the last call, in milliseconds; the time before that call does not count."""
         worst = 1000.0 * max(self.blocks, default=0.0)
         self.blocks.clear()
         self._last, self._drawing = time.perf_counter(), 0.0
