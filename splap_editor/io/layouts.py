@@ -1,7 +1,7 @@
 """Which trainer wrote a table of splats, and what its columns mean."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 
 import numpy as np
@@ -12,6 +12,9 @@ from splap_editor.io.ply_table import PlyTable
 FLAT_LOG_SCALE = -1e9
 """Log-scales below this stand for an extent of exactly zero (trainers write -1e10)."""
 
+
+AXIS_NAMES: dict[int | None, str] = {None: "thinnest", 0: "0", 1: "1", 2: "2"}
+"""Local axes that may be the surface normal, as they are written after a layout's name."""
 
 _CHOSEN = "chosen by hand"
 
@@ -34,6 +37,8 @@ class Layout:
         Scales that mean something, 2 or 3; a 2DGS file may carry an idle third.
     bound : bool
         Positions are relative to a mesh that the file does not hold.
+    axis_is_chosen : bool
+        A person chose the normal axis too.
     """
 
     name: str
@@ -42,11 +47,18 @@ class Layout:
     activated_opacity: bool = False
     n_scales: int = 3
     bound: bool = False
+    axis_is_chosen: bool = False
 
     @property
     def is_chosen(self) -> bool:
         """Whether a person chose it, against what would have been recognised."""
         return self.reason == _CHOSEN
+
+    @property
+    def choice(self) -> str:
+        """What ``read_ply(layout=...)`` takes to read the file like this again: ``"3dgs"``, or ``"3dgs@1"``."""
+        axis = AXIS_NAMES[self.normal_axis]
+        return f"{self.name}@{axis}" if self.axis_is_chosen else self.name
 
 
 LAYOUTS: dict[str, Layout] = {
@@ -101,7 +113,8 @@ def layout_of(table: PlyTable, *, chosen: str | None = None, has_thresholds: Cal
     table : PlyTable
         Vertex columns by name.
     chosen : str, optional
-        Name of the layout to take instead; its meaning must suit the columns.
+        Name of the layout to take instead; its meaning must suit the columns. ``"3dgs@1"`` also names the normal
+        axis: ``thinnest``, ``0``, ``1`` or ``2``.
     has_thresholds : callable () → bool
         Whether SpikingGS thresholds for these rows lie beside the file.
 
@@ -119,11 +132,12 @@ def layout_of(table: PlyTable, *, chosen: str | None = None, has_thresholds: Cal
 
 
 def _with_reason(layout: Layout, reason: str) -> Layout:
-    return Layout(layout.name, reason, layout.normal_axis, layout.activated_opacity, layout.n_scales, layout.bound)
+    return replace(layout, reason=reason)
 
 
 def _chosen_layout(table: PlyTable, chosen: str) -> Layout:
-    """Look up a layout by name and check it against the columns."""
+    """Look up a layout by name, with the normal axis after an @, and check it against the columns."""
+    chosen, at, axis = chosen.partition("@")
     if chosen not in LAYOUTS:
         near = get_close_matches(chosen, LAYOUTS, 1)
         hint = f" (did you mean {near[0]!r}?)" if near else ""
@@ -135,7 +149,26 @@ def _chosen_layout(table: PlyTable, chosen: str) -> Layout:
         raise PlyError(f"{table.name} holds {held} columns: it cannot be read as {chosen!r}.")
     if layout.n_scales == 3 and not packed and "scale_2" not in table.columns:
         raise PlyError(f"{table.name} has two scales per splat: it can only be read as '2dgs', not as {chosen!r}.")
-    return _with_reason(layout, _CHOSEN)
+    if not at:
+        return _with_reason(layout, _CHOSEN)
+    axes = {name: number for number, name in AXIS_NAMES.items()}
+    if axis not in axes:
+        raise PlyError(f"{axis!r} is no normal axis. Choose one of {', '.join(axes)}.")
+    if layout.n_scales == 2 and axes[axis] != 2:
+        raise PlyError(f"splats of {chosen!r} are flat across their axis 2: no other can be their normal.")
+    return replace(layout, reason=_CHOSEN, normal_axis=axes[axis], axis_is_chosen=True)
+
+
+def suiting_layouts(table: PlyTable) -> list[str]:
+    """Names of the layouts that a table could be read as."""
+    names = []
+    for name in LAYOUTS:
+        try:
+            _chosen_layout(table, name)
+        except PlyError:
+            continue
+        names.append(name)
+    return names
 
 
 def _name_by_columns(columns: dict) -> tuple[str, str] | None:

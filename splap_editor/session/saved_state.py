@@ -65,7 +65,7 @@ def saved_state(scene: Scene, look: Look) -> SavedState:
     layout = scene.file.layout
     return SavedState(
         scene.file.path,
-        layout.name if layout.is_chosen else None,
+        layout.choice if layout.is_chosen else None,
         scene.splats.n_splats,
         scene.edit,
         scene.active_handles,

@@ -44,7 +44,8 @@ def ranked(query: str, texts: Sequence[tuple[str, str]], recent: Sequence[str]) 
     for place, (action_id, words) in enumerate(texts):
         score = fuzzy_score(query, words)
         if score is not None:
-            found.append((-score, age.get(action_id, len(age)), place, action_id))
+            # Of equally good ones the shorter has less that was not asked for.
+            found.append((-score, age.get(action_id, len(age)), len(words) if query else 0, place, action_id))
     return [action_id for *_, action_id in sorted(found)]
 
 

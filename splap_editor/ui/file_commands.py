@@ -74,6 +74,11 @@ class FileCommands:
         else:
             self.leave_edit(lambda: self._session.open(path))
 
+    def reread(self, layout: str | None) -> None:
+        """Read the open file again, as another layout; None recognises it. Asks about an edit that would be lost."""
+        path = self._session.scene.file.path
+        self.leave_edit(lambda: self._session.open(path, layout=layout))
+
     def open_edit(self) -> None:
         """Ask for a recipe and make it the edit."""
         self._ask_to_read("Open an edit", EDIT_FILTER, self._read_edit)

@@ -229,6 +229,7 @@ class MainWindow(FileDrop, QMainWindow):
         self.deformer_panel = DeformerPanel(self.session)
         self.display_panel = DisplayPanel(self.display, self.actions_)
         self.scene_panel = ScenePanel(self.session)
+        self.scene_panel.reread.connect(self.files.reread)
         page = QWidget()
         stack = QVBoxLayout(page)
         stack.setContentsMargins(0, 0, 0, 0)

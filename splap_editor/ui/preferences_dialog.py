@@ -45,7 +45,7 @@ class PreferencesDialog(QDialog):
         self.form.changed.connect(store.set)
         self.cache = QLabel()
         self.cache.setProperty("tone", "quiet")
-        self.clear = QPushButton("Clear")
+        self.clear = QPushButton("Clear", autoDefault=False)
         self.clear.clicked.connect(self._on_clear)
         row = QHBoxLayout()
         row.addWidget(self.cache, 1)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from splap_editor.io.layouts import LAYOUTS
-from splap_editor.io.ply import read_ply
+from splap_editor.io.layouts import LAYOUTS, suiting_layouts
+from splap_editor.io.ply import PlyError, read_ply
 from tests.reference.ply import compressed_bytes, ply_bytes, splat_columns
 
 FLAT = np.full(20, -1e10, "f4")
@@ -115,3 +115,28 @@ def test_filters_widen_the_splats(tmp_path):
 def test_splats_bound_to_a_mesh_are_warned_about(name, tmp_path):
     (tmp_path / "a.ply").write_bytes(FILES[name]())
     assert any("bound to a mesh" in warning for warning in read_ply(tmp_path / "a.ply").warnings)
+
+
+def test_a_normal_axis_chosen_by_hand_comes_back_by_its_name(tmp_path):
+    path = tmp_path / "plain.ply"
+    path.write_bytes(FILES["3dgs"]())
+    file = read_ply(path, layout="3dgs@1")
+    assert file.splats.normal_axis == 1 and file.layout.is_chosen and file.layout.choice == "3dgs@1"
+    thinnest = read_ply(path, layout="sugar@thinnest")
+    assert thinnest.splats.normal_axis is None and thinnest.layout.choice == "sugar@thinnest"
+    assert read_ply(path).layout.choice == read_ply(path).layout.name
+    assert set(suiting_layouts(file.table)) == set(LAYOUTS) - {"supersplat-compressed"}
+
+
+@pytest.mark.parametrize(
+    ("sample", "chosen", "message"),
+    [
+        ("3dgs", "3dgs@4", "no normal axis. Choose one of thinnest, 0, 1, 2"),
+        ("3dgs", "3dgs@", "no normal axis"),
+        ("2dgs", "2dgs@0", "flat across their axis 2"),
+    ],
+)
+def test_a_normal_axis_that_cannot_be_is_refused(tmp_path, sample, chosen, message):
+    (tmp_path / "plain.ply").write_bytes(FILES[sample]())
+    with pytest.raises(PlyError, match=message):
+        read_ply(tmp_path / "plain.ply", layout=chosen)

@@ -6,14 +6,23 @@ import numpy as np
 import pytest
 
 from splap_editor.core.occupancy import occupancy_ellipses
-from splap_editor.io.ply import read_ply
+from splap_editor.io.ply import read_ply, write_ply
 from splap_editor.resources import resource
 from splap_editor.session.detective import oddities, reading, round_rows, verdict
 
 
 @pytest.fixture(scope="module")
-def file():
-    return read_ply(resource("samples", "tube.ply"))
+def path(tmp_path_factory):
+    """The tube with a third scale."""
+    flat = read_ply(resource("samples", "tube.ply"))
+    path = tmp_path_factory.mktemp("thick") / "tube.ply"
+    write_ply(path, flat, flat.splats, as_3dgs=True)
+    return path
+
+
+@pytest.fixture(scope="module")
+def file(path):
+    return read_ply(path)
 
 
 def with_rows(array, rows, value):
@@ -52,8 +61,7 @@ def test_the_verdict_follows_the_flatness(file):
     assert len(round_rows(replace(splats, log_scales=splats.log_scales[:, :2]))) == 0
 
 
-def test_the_reading_says_activations_and_normal():
-    path = resource("samples", "tube.ply")
+def test_the_reading_says_activations_and_normal(path):
     plain, turned = read_ply(path), read_ply(path, layout="spikinggs@0")
     assert reading(plain.layout, plain.splats).endswith("opacities through a sigmoid; the thinnest axis is the normal")
     assert reading(turned.layout, turned.splats).endswith("opacities as they are; axis 0 is the normal")

@@ -1,26 +1,37 @@
 """What is open: the file, what wrote it, and what is odd about it."""
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QGridLayout, QLabel, QVBoxLayout, QWidget
 
+from splap_editor.session.detective import reading, verdict
 from splap_editor.session.scene import Scene
-from splap_editor.session.scene_info import flatness, graph_info
+from splap_editor.session.scene_info import graph_info
 from splap_editor.session.session import Session
+from splap_editor.ui.number_field import set_tone
 from splap_editor.ui.options_form import form_label
+from splap_editor.ui.panels.layout_form import LayoutForm
+from splap_editor.ui.panels.oddities_list import OdditiesList
 from splap_editor.ui.theme import STEP
 
 ROWS = {
     "file": "File",
-    "layout": "Layout",
+    "layout": "Written by",
+    "reading": "Meaning",
     "splats": "Splats",
     "colour": "Colour",
     "size": "Size",
     "surface": "Surface",
+    "trust": "Trust",
 }
 
 
 class ScenePanel(QWidget):
-    """Facts about the open file; the surface's are added once it is prepared."""
+    """Facts about the open file; the surface's are added once it is prepared, what is odd once it is looked through.
+
+    `reread` asks for the file to be read again, as the layout that it gives.
+    """
+
+    reread = Signal(object)
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -45,6 +56,11 @@ class ScenePanel(QWidget):
         layout.setSpacing(2 * STEP)
         layout.addLayout(grid)
         layout.addWidget(self.warnings)
+        self.layout_form = LayoutForm()
+        self.layout_form.chosen.connect(lambda choice: self.reread.emit(choice))
+        self.oddities = OdditiesList(session)
+        layout.addWidget(self.layout_form)
+        layout.addWidget(self.oddities)
         session.scene_changed.connect(self._on_scene_changed)
         self._on_scene_changed()
 
@@ -66,9 +82,12 @@ class ScenePanel(QWidget):
         self.facts["splats"].setText(f"{splats.n_splats:,}{inert}")
         degree = splats.sh_degree
         self.facts["colour"].setText(f"view-dependent, degree {degree}" if degree else "the same from every side")
-        flat = flatness(splats)["p50"]
-        shape = "flat discs" if flat < 0.05 else "mostly flat" if flat < 0.3 else "thick: expect a rougher surface"
-        self.facts["size"].setText(f"{scene.ellipses.scene_scale:.4g} units; {shape}")
+        self.facts["reading"].setText(reading(file.layout, splats))
+        self.facts["size"].setText(f"{scene.ellipses.scene_scale:.4g} units")
+        words, tone = verdict(splats)
+        self.facts["trust"].setText(words)
+        set_tone(self.facts["trust"], tone)
+        self.layout_form.show_file(file)
         self.warnings.setText("\n".join(f"• {warning}" for warning in file.warnings))
         self.warnings.setVisible(bool(file.warnings))
         self._show_surface()

@@ -1,0 +1,97 @@
+"""What a file's numbers were taken for, and what is odd about them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from splap_editor.core.occupancy import Ellipses, InertReason
+from splap_editor.core.splats import Splats
+from splap_editor.io.layouts import Layout
+from splap_editor.io.lint import lint
+from splap_editor.session.scene_info import flatness
+
+ROUND = 0.6
+"""A splat is nearly round if its smallest scale is more than this share of its middle one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Oddity:
+    """Something odd about some splats.
+
+    Parameters
+    ----------
+    sentence : str
+        What it is, with the number of rows.
+    rows : (n,) int64
+        File rows concerned, ascending.
+    """
+
+    sentence: str
+    rows: NDArray[np.int64]
+
+
+def oddities(splats: Splats, ellipses: Ellipses) -> list[Oddity]:
+    """Everything odd about the splats of a scene, worst first; takes seconds per million splats.
+
+    Beside what `io.lint.lint` finds: splats that take no part in the surface because they are too faint or have no
+    size, and those so round that their normal is a guess.
+    """
+    found = [Oddity(f"{finding.sentence}.", finding.rows) for finding in lint(splats)]
+    for reason, words in (
+        (InertReason.TRANSPARENT, "too faint to shape the surface"),
+        (InertReason.ZERO_SIZE, "without any size"),
+    ):
+        rows = np.flatnonzero(ellipses.inert == reason)
+        if len(rows):
+            share = 100 * len(rows) / splats.n_splats
+            found.append(Oddity(f"{_splats(len(rows))} {words} ({share:.2g} % of all).", rows))
+    rows = round_rows(splats)
+    if len(rows):
+        found.append(Oddity(f"{_splats(len(rows))} nearly round: which way they face is a guess.", rows))
+    return found
+
+
+def round_rows(splats: Splats) -> NDArray[np.int64]:
+    """File rows of the splats whose smallest scale is nearly as large as their middle one."""
+    if splats.n_scales == 2:
+        return np.zeros(0, np.int64)
+    scales = np.sort(np.asarray(splats.log_scales, np.float64), axis=1)
+    with np.errstate(invalid="ignore"):
+        return np.flatnonzero(scales[:, 0] - scales[:, 1] > np.log(ROUND))
+
+
+def reading(layout: Layout, splats: Splats) -> str:
+    """Say which activations and which normal axis the columns were read with."""
+    opacity = "opacities as they are" if layout.activated_opacity else "opacities through a sigmoid"
+    if layout.normal_axis is None:
+        normal = "the thinnest axis is the normal"
+    else:
+        normal = f"axis {layout.normal_axis} is the normal"
+    extra = ", a filter widens them" if splats.filter_radii is not None else ""
+    cut = ", thresholds cut them" if splats.thresholds is not None else ""
+    return f"scales through exp{extra}{cut}; {opacity}; {normal}"
+
+
+def verdict(splats: Splats) -> tuple[str, str]:
+    """Say how far to trust the graph, from how flat the splats are.
+
+    Returns
+    -------
+    sentence : str
+    tone : str
+        ``""`` or ``"warning"``.
+    """
+    shares = flatness(splats)
+    middle, high = shares["p50"], shares["p95"]
+    if middle < 0.1 and high < 0.5:
+        return "Flat splats: connections follow the surface.", ""
+    if middle < 0.3:
+        return "Mostly flat: connections are good; look at thin parts and gaps.", ""
+    if middle < ROUND:
+        return "Thick splats: some connections may cross gaps. Look at the graph before bending thin parts.", "warning"
+    return "Nearly round splats: neighbours go by distance alone. Do not trust thin parts and gaps.", "warning"
+
+
+def _splats(count: int) -> str:
+    return f"{count:,} splats are" if count > 1 else "1 splat is"
