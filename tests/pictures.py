@@ -117,6 +117,25 @@ def graph_pictures(person: Person) -> None:
     person.picture("neighbors", only_view=True)
 
 
+def weights_picture(person: Person) -> None:
+    """Show an arm bent by a chain of three handles, and how much of it follows the middle one."""
+    window, session = person.window, person.session
+    session.open(resource("samples", "tube.ply"))
+    run_until(lambda: session.scene is not None and session.scene.file.path.name == "tube.ply")
+    person.settle()
+    session.open_edit(resource("samples", "tube_chain.json"))
+    session.scene.set_active_handles((session.scene.edit.handles[1].handle_id,))
+    person.settle()
+    window.display.set(mode="splats", weights=True)
+    window.view.viewport.gizmo.detach()
+    camera = window.view.viewport.camera
+    camera.view = camera.look_from((0.1, -1.0, 0.15))
+    camera.view = window.view.viewport.frame()
+    person.settle()
+    person.picture("weights", only_view=True)
+    window.display.set(weights=False)
+
+
 def main() -> None:
     """Make every picture."""
     QSurfaceFormat.setDefaultFormat(surface_format())
@@ -150,6 +169,7 @@ def main() -> None:
     person.settle()
     person.picture("window")
     graph_pictures(person)
+    weights_picture(person)
     sys.stdout.flush()
     os._exit(0)  # Qt and VTK tear down in no promised order; the pictures are written
 

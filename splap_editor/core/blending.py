@@ -34,7 +34,7 @@ def blended_linear(
         a joint twisted by half a turn.
     """
     displacements = np.ascontiguousarray(transforms[:, :3] - np.eye(3, 4))
-    return _linear(np.ascontiguousarray(rest), *_rows(weights), displacements)
+    return _linear(np.ascontiguousarray(rest), *_rows(weights), displacements, _turns(transforms[:, :3, :3]))
 
 
 def blended_dual_quaternion(
@@ -103,6 +103,24 @@ def _rigid_and_stretch(transforms):
     rotations = (U * signs[:, None, :]) @ Vt
     stretches = (np.swapaxes(Vt, 1, 2) * (signs * singular)[:, None, :]) @ Vt
     return np.ascontiguousarray(matrices_to_quats(rotations)), rotations, stretches
+
+
+def _turns(A):
+    """Axis, scale times cosine and scale times sine of each linear map (H, 5) that turns and scales evenly, else NaN.
+
+    Where such a map alone mixes with rest, ``(1 - v) I + v s R`` is a scaled turn about the same axis across it, so
+    its nearest rotation follows from one complex number.
+    """
+    turns = np.full((len(A), 5), np.nan)
+    for handle, linear in enumerate(A):
+        scale = np.cbrt(np.linalg.det(linear))
+        if not scale > 0 or np.abs(linear.T @ linear - scale**2 * np.eye(3)).max() > 1e-13 * scale**2:
+            continue
+        w, *v = matrices_to_quats(linear[None] / scale)[0]
+        sine = np.linalg.norm(v)
+        axis = np.array(v) / sine if sine > 0 else np.array([1.0, 0.0, 0.0])
+        turns[handle] = [*axis, scale * (w * w - sine * sine), scale * 2.0 * w * sine]
+    return turns
 
 
 @nb.njit(nogil=True, cache=True)
@@ -185,7 +203,7 @@ def _dual_quaternion(rest, indptr, handles, values, screws, agree, excess, offse
 
 
 @nb.njit(nogil=True, cache=True)
-def _linear(rest, indptr, handles, values, displacements):
+def _linear(rest, indptr, handles, values, displacements, turns):
     """Positions and rotations; ``displacements`` (H, 3, 4) are the affine maps less the identity."""
     n = rest.shape[0]
     positions = np.empty((n, 3))
@@ -216,6 +234,20 @@ def _linear(rest, indptr, handles, values, displacements):
         # Nodes at rest and nodes that are only shifted, most of a scene, need no fit.
         if largest == 0.0:
             write_rotation(rotations, i, 1.0, 0.0, 0.0, 0.0)
+            continue
+        re, im = 0.0, 0.0
+        if indptr[i + 1] - indptr[i] == 1:
+            v = values[indptr[i]]
+            turn = turns[handles[indptr[i]]]
+            re, im = 1.0 - v + v * turn[3], v * turn[4]
+        length = np.sqrt(re * re + im * im)
+        # Not for maps that are no even turn (NaN), nor at a joint that has collapsed.
+        if length > 1e-6:
+            # Half the angle, by whichever of sine and cosine loses no digits.
+            major = np.sqrt(0.5 * (1.0 + abs(re) / length))
+            minor = 0.5 * im / (length * major)
+            w, sine = (major, minor) if re > 0 else (minor, major)
+            write_rotation(rotations, i, w, sine * turn[0], sine * turn[1], sine * turn[2])
         else:
             w, x, y, z = rotation_quaternion(a00 + 1.0, a01, a02, a10, a11 + 1.0, a12, a20, a21, a22 + 1.0)
             write_rotation(rotations, i, w, x, y, z)

@@ -8,6 +8,9 @@ from splap_editor.session.edit import Edit
 from splap_editor.session.pipeline import Surface
 from splap_editor.session.scene import Scene
 
+EXACT = 1e-12
+"""Violations below this are roundoff."""
+
 KKT_WARNING = 1e-3
 """Steps of a weight left to go that a person would see."""
 
@@ -70,7 +73,7 @@ def weight_lines(edit: Edit, report: BbwReport) -> list[tuple[str, str]]:
         lines.append(
             (
                 f"{handle.name}: {report.n_unknowns[index]:,} splats, {n} factorisation{'s' if n != 1 else ''}, "
-                f"KKT residual {qp.kkt_residual:.0e}, bounds met to {qp.bound_violation:.0e}"
+                f"KKT residual {qp.kkt_residual:.0e}, bounds met {_closely(qp.bound_violation)}"
                 + (", by the interior-point fallback since the active set did not settle." if qp.fallback else "."),
                 "warning" if qp.fallback or qp.kkt_residual > KKT_WARNING else "quiet",
             )
@@ -80,3 +83,7 @@ def weight_lines(edit: Edit, report: BbwReport) -> list[tuple[str, str]]:
     if report.n_resting:
         lines.append((f"{report.n_resting:,} splats in pieces that no handle touches stay at rest.", "quiet"))
     return lines
+
+
+def _closely(violation: float) -> str:
+    return "exactly" if violation < EXACT else f"to {violation:.0e}"

@@ -153,3 +153,19 @@ def test_dual_quaternion_blending_does_not_depend_on_where_the_origin_is():
     here, _ = blended_dual_quaternion(points, weights, transforms, np.zeros((3, 3)))
     there, _ = blended_dual_quaternion(points + shift, weights, moved, np.tile(shift, (3, 1)))
     np.testing.assert_allclose(there - shift, here, atol=1e-12)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-7, 0.3, 1.5, 3.0, np.pi])
+@pytest.mark.parametrize("scale", [0.4, 1.0, 2.5])
+def test_one_even_turn_mixed_with_rest_gives_the_nearest_rotation(angle, scale):
+    axis = np.array([1.0, -2.0, 0.5]) / np.sqrt(5.25)
+    transform = rigid(axis, angle, np.zeros(3))[None].copy()
+    transform[0, :3, :3] *= scale
+    shares = np.linspace(0.02, 1.0, 25)
+    weights = sp.csr_array(shares[:, None])
+    _, rotations = blended_linear(np.zeros((25, 3)), weights, transform)
+    for share, rotation in zip(shares, rotations, strict=True):
+        mean = (1.0 - share) * np.eye(3) + share * transform[0, :3, :3]
+        # Half a turn mixed half and half collapses: no rotation is nearest.
+        if np.linalg.svd(mean)[1][1] > 1e-6:
+            np.testing.assert_allclose(rotation, polar_rotation(mean), atol=1e-12)

@@ -19,7 +19,7 @@ class Section(QFrame):
     def __init__(self, title: str, body: QWidget, *, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("panelSection")
-        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
         self._key = f"panels/{title.lower()}"
         self.body = body
         self.header = QToolButton(text=title, checkable=True)
