@@ -11,8 +11,8 @@ from PySide6.QtWidgets import QFileDialog, QMessageBox, QWidget
 
 from splap_editor.io.session_file import SUFFIX
 from splap_editor.resources import resource
-from splap_editor.session.documents import Documents
 from splap_editor.session.bound_edit import column_lacks
+from splap_editor.session.documents import Documents
 from splap_editor.session.export_report import ExportReport
 from splap_editor.session.session import Session
 from splap_editor.ui.export_dialog import ExportDialog
