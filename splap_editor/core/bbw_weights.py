@@ -17,6 +17,9 @@ from splap_editor.core.progress import Progress, no_progress, part_of
 
 _FREE, _PIN = -2, -1
 
+CHEAP_UNKNOWNS = 10_000
+"""So many take a few hundredths of a second to factorise."""
+
 
 @dataclass(frozen=True)
 class BbwOptions:
@@ -27,8 +30,9 @@ class BbwOptions:
     blending : {"dual-quaternion", "linear"}
         How the handles' transforms are mixed at a drag; see `blending.blended`. The weights do not depend on it.
     tolerance : float
-        Change of the weights at which their solution stops. They are then a few times that from the optimum, farther
-        only in fringes that hang on by a few weak links, where the energy hardly tells one value from another.
+        Change of the weights at which their solution stops, a tenth of it up to `CHEAP_UNKNOWNS`. They are then a few
+        times that from the optimum, farther only in fringes that hang on by a few weak links, where the energy hardly
+        tells one value from another.
     max_factorisations : int
         Sparse factorisations per handle before the interior-point fallback.
     mass_floor : float
@@ -270,12 +274,19 @@ def _level_weight(problem, k, handle, in_cage, start, progress):
         np.zeros(n),
         np.ones(n),
         start=None if start is None else start[unknowns],
-        tolerance=options.tolerance if k == 0 else 3 * options.tolerance,
+        tolerance=_tolerance(options.tolerance, k, n),
         max_factorisations=options.max_factorisations,
         progress=progress,
     )
     values[unknowns] = solution.w
     return values, unknowns, solution
+
+
+def _tolerance(wanted, k, n_unknowns):
+    """Coarse levels only give a start; where factorisations are cheap, fringes on weak links get the few more steps."""
+    if k:
+        return 3 * wanted
+    return wanted if n_unknowns > CHEAP_UNKNOWNS else 0.1 * wanted
 
 
 def _check_shapes(n, L, M, handles):

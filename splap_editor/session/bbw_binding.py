@@ -16,7 +16,7 @@ from splap_editor.core.progress import Cancelled, Progress, part_of
 from splap_editor.session.cache import Arrays, StageCache, content_key
 from splap_editor.session.jobs import REPORT_SECONDS
 
-WEIGHTS_VERSION = 2
+WEIGHTS_VERSION = 3
 """Raised whenever the solver gives other weights than before."""
 
 N_THREADS = 4
