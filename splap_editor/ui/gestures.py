@@ -3,7 +3,7 @@
 GESTURES: dict[str, tuple[tuple[str, str], ...]] = {
     "Look around": (
         ("Middle drag", "Orbit"),
-        ("Left drag on empty space", "Orbit"),
+        ("Left drag on empty space", "Orbit; by preference anywhere"),
         ("Shift + middle drag", "Pan"),
         ("Ctrl + middle drag, wheel", "Zoom to the pointer"),
         ("Two fingers", "Orbit; with Shift pan"),
