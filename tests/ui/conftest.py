@@ -75,10 +75,13 @@ class Driver:
         width, height = viewport.projection.width, viewport.projection.height
         screen = viewport.screen_points()
         order = np.argsort(np.hypot(screen[:, 0] - width / 2, screen[:, 1] - height / 2))
+        ratio = self.window.viewport.devicePixelRatioF()
         for x, y in screen[order[:200], :2]:
-            if viewport.pick(float(x), float(y)) is not None:
-                ratio = self.window.viewport.devicePixelRatioF()
-                return QPoint(round(x / ratio), round(y / ratio))
+            at = QPoint(round(x / ratio), round(y / ratio))
+            # The mouse comes to whole pixels only, and a hand is not sure of one.
+            around = [(at.x() + dx, at.y() + dy) for dx in (-1, 0, 1) for dy in (-1, 0, 1)]
+            if all(viewport.pick(float(px * ratio), float(py * ratio)) is not None for px, py in around):
+                return at
         raise AssertionError("no splat is in the picture")
 
     def move(self, to: QPoint) -> None:
