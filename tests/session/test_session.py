@@ -1,10 +1,8 @@
 """A session as the window drives it, without the window."""
 
 import errno
-import queue
 import shutil
 import threading
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -18,27 +16,9 @@ from splap_editor.session.cache import StageCache
 from splap_editor.session.edit import Pose
 from splap_editor.session.placement import disc_rows, held_pose, rows_region
 from splap_editor.session.session import Session
+from tests.session.main_thread import MainThread
 
 TUBE = resource("samples", "tube.ply")
-
-
-class MainThread:
-    """The event loop: runs what the workers post."""
-
-    def __init__(self):
-        self.calls = queue.Queue()
-
-    def post(self, call):
-        self.calls.put(call)
-
-    def run_until(self, condition, seconds=120.0):
-        end = time.monotonic() + seconds
-        while not condition():
-            try:
-                call = self.calls.get(timeout=max(end - time.monotonic(), 0.001))
-            except queue.Empty:
-                raise AssertionError("it did not happen in time") from None
-            call()
 
 
 @pytest.fixture
