@@ -13,8 +13,8 @@ from PySide6.QtCore import QCoreApplication, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QSurfaceFormat
 from PySide6.QtWidgets import QApplication
 
+from splap_editor.engine.cache import StageCache
 from splap_editor.session.autosave import Autosave
-from splap_editor.session.cache import StageCache
 from splap_editor.session.documents import Documents
 from splap_editor.session.jobs import Job
 from splap_editor.session.session import Session
@@ -25,9 +25,9 @@ from splap_editor.tools.navigate_tool import NavigateTool
 from splap_editor.tools.select_tool import SelectTool
 from splap_editor.tools.tool import ToolContext, ToolManager
 from splap_editor.tools.transform_tool import TransformTool
+from splap_editor.ui.actions.file_commands import sample_path
 from splap_editor.ui.collector import MainThreadCollector
 from splap_editor.ui.display import Display
-from splap_editor.ui.file_commands import sample_path
 from splap_editor.ui.main_window import MainWindow
 from splap_editor.ui.theme import apply_theme
 from splap_editor.ui.viewport_widget import ViewportWidget, surface_format

@@ -132,13 +132,13 @@ def _render(options: argparse.Namespace) -> int:
 
 
 def _deform(options: argparse.Namespace) -> int:
-    from splap_editor.core.kernel_adaptation import adapted_splats
+    from splap_editor.core.adaptation.kernel_adaptation import adapted_splats
+    from splap_editor.engine.cache import StageCache
+    from splap_editor.engine.export_report import export_report
+    from splap_editor.engine.pipeline import deformer_of, handles_of, kernels_of, surface_of
+    from splap_editor.engine.quantities import Snapshot, column_names, columns_of
     from splap_editor.frames_cli import deform_frames, edit_for, read_edit_file
     from splap_editor.io.ply import read_ply, write_ply
-    from splap_editor.session.cache import StageCache
-    from splap_editor.session.export_report import export_report
-    from splap_editor.session.pipeline import deformer_of, handles_of, kernels_of, surface_of
-    from splap_editor.session.quantities import Snapshot, column_names, columns_of
 
     if options.frames is not None:
         return deform_frames(options)
@@ -197,8 +197,8 @@ def _deform(options: argparse.Namespace) -> int:
 
 
 def _info(options: argparse.Namespace) -> int:
+    from splap_editor.engine.scene_info import graph_info, scene_info
     from splap_editor.io.ply import read_ply
-    from splap_editor.session.scene_info import graph_info, scene_info
 
     report = StageReport(quiet=options.quiet or options.json)
     with report("read"):
@@ -206,8 +206,8 @@ def _info(options: argparse.Namespace) -> int:
     with report("occupancy"):
         info, ellipses = scene_info(file)
     if options.graph:
-        from splap_editor.core.splat_graph import GraphOptions
-        from splap_editor.session.pipeline import surface_of
+        from splap_editor.core.graph.splat_graph import GraphOptions
+        from splap_editor.engine.pipeline import surface_of
 
         surface = surface_of(file.splats, GraphOptions(), ellipses=ellipses, stages=report.stage)
         report.end_stage()
@@ -221,12 +221,12 @@ def _info(options: argparse.Namespace) -> int:
 def _graph(options: argparse.Namespace) -> int:
     import numpy as np
 
-    from splap_editor.core.ellipse_offset import normal_offsets
-    from splap_editor.core.occupancy import occupancy_ellipses
-    from splap_editor.core.splat_graph import GraphOptions, splat_graph
+    from splap_editor.core.graph.ellipse_offset import normal_offsets
+    from splap_editor.core.graph.splat_graph import GraphOptions, splat_graph
+    from splap_editor.core.splats.occupancy import occupancy_ellipses
+    from splap_editor.engine.scene_info import graph_info
     from splap_editor.io.edges_ply import write_edges_ply
     from splap_editor.io.ply import read_ply
-    from splap_editor.session.scene_info import graph_info
 
     report = StageReport(quiet=options.quiet or options.json)
     with report("read"):

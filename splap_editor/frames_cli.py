@@ -13,9 +13,9 @@ from splap_editor.io.session_specs import SessionFile
 from splap_editor.stage_report import StageReport
 
 if TYPE_CHECKING:
+    from splap_editor.engine.edit import Edit
+    from splap_editor.engine.frames import FramePoser
     from splap_editor.io.ply import SplatFile
-    from splap_editor.session.edit import Edit
-    from splap_editor.session.frames import FramePoser
     from splap_editor.viewport.camera import View
     from splap_editor.viewport.studio import Studio
 
@@ -31,8 +31,8 @@ def read_edit_file(options: argparse.Namespace) -> Recipe | SessionFile | None:
 
 def edit_for(held: Recipe | SessionFile | None, file: "SplatFile", say: Callable[[str], None]) -> "Edit":
     """Make an edit of a recipe or session for a file; says so where the session was made for another."""
-    from splap_editor.session.edit import Edit
-    from splap_editor.session.recipe_edit import edit_of
+    from splap_editor.engine.edit import Edit
+    from splap_editor.engine.recipe_edit import edit_of
     from splap_editor.session.saved_state import session_edit
 
     if held is None:
@@ -46,7 +46,7 @@ def edit_for(held: Recipe | SessionFile | None, file: "SplatFile", say: Callable
 
 def deform_frames(options: argparse.Namespace) -> int:
     """Write a PLY for each frame of a session."""
-    from splap_editor.session.frames import frame_range, write_frames
+    from splap_editor.engine.frames import frame_range, write_frames
 
     if options.columns:
         raise ValueError("--columns goes with one PLY, not with --frames")
@@ -64,7 +64,7 @@ def deform_frames(options: argparse.Namespace) -> int:
 
 def render(options: argparse.Namespace) -> int:
     """Draw a picture, one for each frame, or one for each step of a turntable."""
-    from splap_editor.session.frames import frame_range, write_pictures
+    from splap_editor.engine.frames import frame_range, write_pictures
     from splap_editor.viewport.studio import turntable_views
 
     if options.turntable is not None and not 1 <= options.turntable <= LARGEST_TURNTABLE:
@@ -109,10 +109,10 @@ def render(options: argparse.Namespace) -> int:
 def _prepared(
     options: argparse.Namespace, held: Recipe | SessionFile | None, report: StageReport
 ) -> tuple["SplatFile", "FramePoser"]:
+    from splap_editor.engine.cache import StageCache
+    from splap_editor.engine.frames import frame_poser
+    from splap_editor.engine.pipeline import surface_of
     from splap_editor.io.ply import read_ply
-    from splap_editor.session.cache import StageCache
-    from splap_editor.session.frames import frame_poser
-    from splap_editor.session.pipeline import surface_of
 
     layout = options.layout or (held.ply.layout if isinstance(held, SessionFile) else None)
     with report("read"):
@@ -163,7 +163,7 @@ def _studio(
 def _drawn_round(
     studio: "Studio", views: "list[View]", output: Path, is_transparent: bool, report: StageReport
 ) -> list[Path]:
-    from splap_editor.session.frames import frame_path
+    from splap_editor.engine.frames import frame_path
 
     written = []
     for number, view in enumerate(views, start=1):

@@ -12,15 +12,15 @@ import numba
 import numpy as np
 
 import splap_editor
+from splap_editor.core.adaptation.kernel_adaptation import adapted_splats
+from splap_editor.core.graph.splat_graph import GraphOptions
 from splap_editor.core.handle_nodes import Region
-from splap_editor.core.kernel_adaptation import adapted_splats
 from splap_editor.core.progress import no_progress
-from splap_editor.core.spherical_harmonics import view_colors
-from splap_editor.core.splat_graph import GraphOptions
-from splap_editor.core.splats import Splats
-from splap_editor.session.cache import default_cache_folder
-from splap_editor.session.edit import Edit, Handle, Pose
-from splap_editor.session.pipeline import deformer_of, handles_of, kernels_of, surface_of
+from splap_editor.core.splats.spherical_harmonics import view_colors
+from splap_editor.core.splats.splats import Splats
+from splap_editor.engine.cache import default_cache_folder
+from splap_editor.engine.edit import Edit, Handle, Pose
+from splap_editor.engine.pipeline import deformer_of, handles_of, kernels_of, surface_of
 
 PARTS = ("view", "engine")
 """What is compiled side by side; the first is enough to show a scene."""

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from splap_editor.core.deformer import Handles
-from splap_editor.core.occupancy import Ellipses
+from splap_editor.core.splats.occupancy import Ellipses
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.splats import Splats
+from splap_editor.core.splats.splats import Splats
 from splap_editor.io.ply_header import PlyError
 from splap_editor.io.ply_table import PlyTable
 from splap_editor.io.splat_columns import SH_C0, column_group

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.splats import Splats
+from splap_editor.core.splats.splats import Splats
 
 GIANT = 0.25
 """A splat is giant if one standard deviation is longer than this share of the scene's inner 98 % box."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from splap_editor.core.progress import Progress, no_progress, part_of
-from splap_editor.core.splats import Splats
+from splap_editor.core.splats.splats import Splats
 from splap_editor.io.atomic_file import atomic_file
 from splap_editor.io.layouts import Layout, layout_of
 from splap_editor.io.lint import unusable_rows

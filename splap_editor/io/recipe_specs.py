@@ -16,7 +16,7 @@ Quaternion = tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class GraphSpec:
-    """What makes two splats neighbours: the fields of `splap_editor.core.splat_graph.GraphOptions`."""
+    """What makes two splats neighbours: the fields of `splap_editor.core.graph.splat_graph.GraphOptions`."""
 
     rule: Literal["touch", "paper"] = "touch"
     epsilon: float = 0.005

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.splats import Splats
+from splap_editor.core.splats.splats import Splats
 from splap_editor.io.sample_placement import even_points, fitted_axes, random_tangents, tilted_normals
 from splap_editor.io.sample_shapes import SHAPES, Surface
 

@@ -51,7 +51,7 @@ class KeySpec:
 
 @dataclass(frozen=True)
 class TimelineSpec:
-    """Keyframes: the fields of `splap_editor.session.timeline.Timeline`."""
+    """Keyframes: the fields of `splap_editor.engine.timeline.Timeline`."""
 
     keys: tuple[KeySpec, ...] = ()
     frame: int = 1

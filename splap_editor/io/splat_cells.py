@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.splats import Splats
+from splap_editor.core.splats.splats import Splats
 from splap_editor.io.layouts import Layout
 from splap_editor.io.ply_header import ply_header
 from splap_editor.io.ply_table import CellChanges, PlyTable

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.splats import Splats
+from splap_editor.core.splats.splats import Splats
 from splap_editor.io.layouts import Layout
 from splap_editor.io.ply_header import PlyElement, PlyError
 from splap_editor.io.ply_table import PlyTable

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from splap_editor.core.deformer import Deformer, Handles
-from splap_editor.session.edit import Edit
-from splap_editor.session.quantities import QUANTITIES, Snapshot, missing
+from splap_editor.engine.edit import Edit
+from splap_editor.engine.quantities import QUANTITIES, Snapshot, missing
 from splap_editor.session.scene import Scene
 
 

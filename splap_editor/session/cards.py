@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.ellipse_offset import normal_offsets, touch_scales
-from splap_editor.core.occupancy import Ellipses, InertReason
-from splap_editor.core.splat_graph import SplatGraph
-from splap_editor.core.splats import Splats
+from splap_editor.core.graph.ellipse_offset import normal_offsets, touch_scales
+from splap_editor.core.graph.splat_graph import SplatGraph
+from splap_editor.core.splats.occupancy import Ellipses, InertReason
+from splap_editor.core.splats.splats import Splats
 
 INERT_WORDS = {
     InertReason.ACTIVE: "",

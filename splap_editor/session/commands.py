@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.session.edit import Edit
+from splap_editor.engine.edit import Edit
 from splap_editor.session.scene import Scene
 
 EDIT_BYTES = 2048

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.occupancy import Ellipses, InertReason
-from splap_editor.core.splats import Splats
+from splap_editor.core.splats.occupancy import Ellipses, InertReason
+from splap_editor.core.splats.splats import Splats
+from splap_editor.engine.scene_info import flatness
 from splap_editor.io.layouts import Layout
 from splap_editor.io.lint import lint
-from splap_editor.session.scene_info import flatness
 
 ROUND = 0.6
 """A splat is nearly round if its smallest scale is more than this share of its middle one."""

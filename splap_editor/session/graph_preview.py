@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 
-from splap_editor.core.splat_graph import GraphOptions, SplatGraph, splat_graph
+from splap_editor.core.graph.splat_graph import GraphOptions, SplatGraph, splat_graph
+from splap_editor.engine.parallel_lock import alone
 from splap_editor.session.jobs import REPORT_SECONDS, Job
 from splap_editor.session.latest_job import LatestJob
-from splap_editor.session.parallel_lock import alone
 from splap_editor.session.session import Session
 from splap_editor.session.signals import Signal
 

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from splap_editor.core.ellipse_offset import touch_scales
-from splap_editor.core.occupancy import Ellipses
-from splap_editor.core.splat_graph import GraphOptions, SplatGraph
+from splap_editor.core.graph.ellipse_offset import touch_scales
+from splap_editor.core.graph.splat_graph import GraphOptions, SplatGraph
+from splap_editor.core.splats.occupancy import Ellipses
 
 Pairs = NDArray[np.int64]
 

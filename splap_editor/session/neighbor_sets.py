@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.geodesics import Neighborhoods, geodesic_distances
-from splap_editor.core.occupancy import Ellipses
-from splap_editor.core.splat_graph import SplatGraph
+from splap_editor.core.graph.splat_graph import SplatGraph
+from splap_editor.core.splats.occupancy import Ellipses
+from splap_editor.core.surface.geodesics import Neighborhoods, geodesic_distances
 
 NEIGHBOR_KINDS = {
     "graph": "Splat graph",

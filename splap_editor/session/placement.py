@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.geodesics import geodesic_distances
+from splap_editor.core.arap.rotation_fit import fit_rotations
 from splap_editor.core.handle_nodes import Region
-from splap_editor.core.rotation_fit import fit_rotations
-from splap_editor.core.rotations import matrices_to_quats
-from splap_editor.session.edit import Pose
+from splap_editor.core.splats.rotations import matrices_to_quats
+from splap_editor.core.surface.geodesics import geodesic_distances
+from splap_editor.engine.edit import Pose
 from splap_editor.session.scene import Scene
 
 

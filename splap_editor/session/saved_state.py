@@ -7,6 +7,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.engine.edit import Edit
+from splap_editor.engine.pose import Pose
+from splap_editor.engine.recipe_edit import edit_of, recipe_of
+from splap_editor.engine.timeline import Key, Timeline
 from splap_editor.io.session_file import SessionFileError, relative_path
 from splap_editor.io.session_specs import (
     HandleSettings,
@@ -18,11 +22,7 @@ from splap_editor.io.session_specs import (
     TimelineSpec,
     ViewSpec,
 )
-from splap_editor.session.edit import Edit
-from splap_editor.session.pose import Pose
-from splap_editor.session.recipe_edit import edit_of, recipe_of
 from splap_editor.session.scene import Scene
-from splap_editor.session.timeline import Key, Timeline
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,13 +5,13 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
 from splap_editor.core.deformer import Deformation
-from splap_editor.core.kernel_adaptation import AdaptedKernels
-from splap_editor.core.occupancy import Ellipses
-from splap_editor.core.splats import Splats
+from splap_editor.core.splats.occupancy import Ellipses
+from splap_editor.core.splats.splats import Splats
+from splap_editor.engine.edit import Edit
+from splap_editor.engine.pipeline import Surface
 from splap_editor.io.ply import SplatFile
-from splap_editor.session.edit import Edit
-from splap_editor.session.pipeline import Surface
 from splap_editor.session.signals import Signal
 
 

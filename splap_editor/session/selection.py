@@ -5,8 +5,8 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.occupancy import Ellipses
-from splap_editor.core.splat_graph import SplatGraph
+from splap_editor.core.graph.splat_graph import SplatGraph
+from splap_editor.core.splats.occupancy import Ellipses
 
 Mask = NDArray[np.bool_]
 

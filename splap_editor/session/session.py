@@ -8,21 +8,21 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
 from splap_editor.core.deformer import Deformation
+from splap_editor.core.graph.splat_graph import GraphOptions
 from splap_editor.core.handle_nodes import Region
-from splap_editor.core.kernel_adaptation import AdaptedKernels
-from splap_editor.core.splat_graph import GraphOptions
+from splap_editor.engine.cache import StageCache
+from splap_editor.engine.edit import HANDLE_COLORS, Edit, Handle, Pose, binds_like, poses_like
+from splap_editor.engine.export_report import ExportReport
+from splap_editor.engine.keyframes import auto_keyed_edit
+from splap_editor.engine.pipeline import Surface, kernels_of
+from splap_editor.engine.recipe_edit import edit_of, recipe_of
 from splap_editor.io.recipe import read_recipe, write_recipe
 from splap_editor.session.bound_edit import BoundEdit, snapshot_of
-from splap_editor.session.cache import StageCache
 from splap_editor.session.commands import ChangeEdit, ChangeMask
-from splap_editor.session.edit import HANDLE_COLORS, Edit, Handle, Pose, binds_like, poses_like
-from splap_editor.session.export_report import ExportReport
 from splap_editor.session.history import History
 from splap_editor.session.jobs import Job, Post, Worker
-from splap_editor.session.keyframes import auto_keyed_edit
-from splap_editor.session.pipeline import Surface, kernels_of
-from splap_editor.session.recipe_edit import edit_of, recipe_of
 from splap_editor.session.scene import Scene
 from splap_editor.session.signals import Signal
 from splap_editor.session.work import Depictor, bound_edit, exported_file, opened_scene, prepared_surface

@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.bbw import BbwDeformer, BbwReport
-from splap_editor.session.edit import Edit
-from splap_editor.session.pipeline import Surface
+from splap_editor.core.bbw.bbw import BbwDeformer, BbwReport
+from splap_editor.engine.edit import Edit
+from splap_editor.engine.pipeline import Surface
 from splap_editor.session.scene import Scene
 
 EXACT = 1e-12

@@ -3,18 +3,18 @@
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from splap_editor.core.kernel_adaptation import AdaptedKernels, adapted_splats
-from splap_editor.core.occupancy import Ellipses, occupancy_ellipses
-from splap_editor.core.splat_graph import GraphOptions
-from splap_editor.core.splats import Splats
+from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels, adapted_splats
+from splap_editor.core.graph.splat_graph import GraphOptions
+from splap_editor.core.splats.occupancy import Ellipses, occupancy_ellipses
+from splap_editor.core.splats.splats import Splats
+from splap_editor.engine.cache import StageCache
+from splap_editor.engine.edit import Edit
+from splap_editor.engine.export_report import ExportReport, export_report
+from splap_editor.engine.pipeline import Surface, deformer_of, handles_of, surface_of
+from splap_editor.engine.quantities import Snapshot, columns_of
 from splap_editor.io.ply import SplatFile, read_ply, write_ply
 from splap_editor.session.bound_edit import BoundEdit
-from splap_editor.session.cache import StageCache
-from splap_editor.session.edit import Edit
-from splap_editor.session.export_report import ExportReport, export_report
 from splap_editor.session.jobs import Job
-from splap_editor.session.pipeline import Surface, deformer_of, handles_of, surface_of
-from splap_editor.session.quantities import Snapshot, columns_of
 from splap_editor.session.scene import Scene
 
 Depictor = Callable[[Splats], object]

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.session.edit import Handle, Pose
+from splap_editor.engine.edit import Handle, Pose
 from splap_editor.tools.tool import KeyEvent, PointerEvent, ToolContext
 from splap_editor.viewport.gizmo import DOT, SCALE_BOX, VIEW_RING, Act, Lock, Part
 

@@ -10,13 +10,13 @@ from splap_editor.session.session import Session
 from splap_editor.session.signals import Signal
 from splap_editor.tools.probe_tool import ProbeTool
 from splap_editor.tools.tool import ToolContext, ToolManager
-from splap_editor.ui.actions import ActionSet
-from splap_editor.ui.graph_commands import CONDITIONS, GraphCommands
+from splap_editor.ui.actions.actions import ActionSet
+from splap_editor.ui.actions.graph_commands import CONDITIONS, GraphCommands
 from splap_editor.ui.panels.graph_panel import GraphPanel
 from splap_editor.ui.panels.inspect_panel import InspectPanel
 from splap_editor.ui.panels.quantity_panel import QuantityPanel
 from splap_editor.ui.panels.section import bring_into_view
-from splap_editor.ui.quantity_legend import QuantityLegend
+from splap_editor.ui.widgets.quantity_legend import QuantityLegend
 from splap_editor.viewport.camera import View
 from splap_editor.viewport.graph_view import GraphView
 from splap_editor.viewport.inspect_view import InspectView

@@ -20,37 +20,37 @@ from splap_editor.session.documents import Documents
 from splap_editor.session.session import Session
 from splap_editor.tools.select_tool import SelectTool
 from splap_editor.tools.tool import ToolContext, ToolManager
-from splap_editor.ui.actions import ActionSet
-from splap_editor.ui.commands import DisplayCommands, EditCommands, HandleCommands, SelectCommands, ToolCommands
-from splap_editor.ui.conditions import scene_meets
+from splap_editor.ui.actions.actions import ActionSet
+from splap_editor.ui.actions.commands import DisplayCommands, EditCommands, HandleCommands, SelectCommands, ToolCommands
+from splap_editor.ui.actions.conditions import scene_meets
+from splap_editor.ui.actions.document_commands import DocumentCommands
+from splap_editor.ui.actions.file_commands import FileCommands
+from splap_editor.ui.actions.menus import fill_menu_bar
+from splap_editor.ui.actions.pose_commands import PoseCommands
+from splap_editor.ui.actions.program_commands import ProgramCommands
+from splap_editor.ui.actions.selection_sets_menu import SelectionSetsMenu
+from splap_editor.ui.actions.timeline_commands import TimelineCommands
+from splap_editor.ui.actions.view_commands import ViewCommands
+from splap_editor.ui.dialogs.help_sheet import HelpSheet
+from splap_editor.ui.dialogs.picture_dialog import PictureDialog
 from splap_editor.ui.display import Display
-from splap_editor.ui.document_commands import DocumentCommands
-from splap_editor.ui.file_commands import FileCommands
 from splap_editor.ui.file_drop import FileDrop
-from splap_editor.ui.help_sheet import HelpSheet
 from splap_editor.ui.inspection import Inspection
-from splap_editor.ui.job_bar import JobBar
-from splap_editor.ui.menus import fill_menu_bar
-from splap_editor.ui.overlay import Overlay
 from splap_editor.ui.panels.deformer_panel import DeformerPanel
 from splap_editor.ui.panels.display_panel import DisplayPanel
 from splap_editor.ui.panels.handles_panel import HandlesPanel
 from splap_editor.ui.panels.scene_panel import ScenePanel
 from splap_editor.ui.panels.section import Section
-from splap_editor.ui.picture_dialog import PictureDialog
-from splap_editor.ui.pose_commands import PoseCommands
 from splap_editor.ui.preferences import PreferenceStore
-from splap_editor.ui.program_commands import ProgramCommands
-from splap_editor.ui.recovery_bar import RecoveryBar
-from splap_editor.ui.selection_sets_menu import SelectionSetsMenu
-from splap_editor.ui.state_line import StateLine
-from splap_editor.ui.timeline_commands import TimelineCommands
-from splap_editor.ui.timeline_strip import TimelineStrip
-from splap_editor.ui.toast import Toast
-from splap_editor.ui.tool_options import ToolOptionsBar
-from splap_editor.ui.view_commands import ViewCommands
+from splap_editor.ui.timeline.strip import TimelineStrip
 from splap_editor.ui.viewport_widget import ViewportWidget
-from splap_editor.ui.weight_legend import WeightLegend
+from splap_editor.ui.widgets.job_bar import JobBar
+from splap_editor.ui.widgets.overlay import Overlay
+from splap_editor.ui.widgets.recovery_bar import RecoveryBar
+from splap_editor.ui.widgets.state_line import StateLine
+from splap_editor.ui.widgets.toast import Toast
+from splap_editor.ui.widgets.tool_options import ToolOptionsBar
+from splap_editor.ui.widgets.weight_legend import WeightLegend
 from splap_editor.viewport.scene_view import SceneView
 
 HINT = ("Click the surface to place a handle.", "Drag the arrows.")

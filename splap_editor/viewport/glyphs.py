@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from splap_editor.core.rotations import quats_to_matrices
-from splap_editor.core.splats import Splats
+from splap_editor.core.splats.rotations import quats_to_matrices
+from splap_editor.core.splats.splats import Splats
 
 SH_C0 = 0.28209479177387814
 MIN_CONTRIBUTION = 1.0 / 255.0

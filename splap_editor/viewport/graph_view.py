@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.ellipse_offset import normal_offsets
+from splap_editor.core.graph.ellipse_offset import normal_offsets
+from splap_editor.engine.pipeline import Surface
 from splap_editor.session.jobs import Job
 from splap_editor.session.latest_job import LatestJob
-from splap_editor.session.pipeline import Surface
 from splap_editor.session.session import Session
 from splap_editor.session.signals import Signal
 from splap_editor.viewport.colormaps import label_colors, mapped_colors, shares

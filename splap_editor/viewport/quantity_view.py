@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.engine.quantities import QUANTITIES, Quantity, Snapshot, missing
 from splap_editor.session.bound_edit import snapshot_of
 from splap_editor.session.jobs import Job
 from splap_editor.session.latest_job import LatestJob
-from splap_editor.session.quantities import QUANTITIES, Quantity, Snapshot, missing
 from splap_editor.session.session import Session
 from splap_editor.session.signals import Signal
 from splap_editor.viewport.colormaps import TWO_SIDED, label_colors, mapped_colors, shares

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.kernel_adaptation import AdaptedKernels
-from splap_editor.core.rotations import quats_to_matrices
-from splap_editor.core.spherical_harmonics import view_colors
-from splap_editor.core.splats import Splats
-from splap_editor.session.edit import Handle
+from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
+from splap_editor.core.splats.rotations import quats_to_matrices
+from splap_editor.core.splats.spherical_harmonics import view_colors
+from splap_editor.core.splats.splats import Splats
+from splap_editor.engine.edit import Handle
 from splap_editor.session.jobs import Job
 from splap_editor.session.scene import Scene
 from splap_editor.session.session import Session

@@ -4,9 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 from vtkmodules.vtkRenderingCore import vtkRenderWindow
 
-from splap_editor.core.kernel_adaptation import AdaptedKernels
-from splap_editor.core.spherical_harmonics import view_colors
-from splap_editor.core.splats import Splats
+from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
+from splap_editor.core.splats.spherical_harmonics import view_colors
+from splap_editor.core.splats.splats import Splats
 from splap_editor.viewport.camera import View, orbited
 from splap_editor.viewport.glyphs import base_colors, rgba_bytes, splat_glyphs
 from splap_editor.viewport.scene_view import suggested_up

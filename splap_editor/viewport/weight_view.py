@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.handle_nodes import Region, handle_nodes
-from splap_editor.session.edit import Handle
+from splap_editor.engine.edit import Handle
 from splap_editor.session.scene import Scene
 from splap_editor.session.session import Session
 from splap_editor.session.signals import Signal

@@ -18,14 +18,14 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from splap_editor.core.adaptation.kernel_adaptation import KernelBinding, adapt_kernels, adapted_splats
+from splap_editor.core.arap.rotation_fit import fit_rotations
 from splap_editor.core.deformer import Deformation
-from splap_editor.core.geodesics import geodesic_neighbors
-from splap_editor.core.kernel_adaptation import KernelBinding, adapt_kernels, adapted_splats
-from splap_editor.core.occupancy import occupancy_ellipses
-from splap_editor.core.rotation_fit import fit_rotations
-from splap_editor.core.spherical_harmonics import rotated_sh, view_colors
-from splap_editor.core.splat_graph import splat_graph
-from splap_editor.core.splats import Splats
+from splap_editor.core.graph.splat_graph import splat_graph
+from splap_editor.core.splats.occupancy import occupancy_ellipses
+from splap_editor.core.splats.spherical_harmonics import rotated_sh, view_colors
+from splap_editor.core.splats.splats import Splats
+from splap_editor.core.surface.geodesics import geodesic_neighbors
 
 ANGLES = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
 

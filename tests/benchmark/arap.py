@@ -24,12 +24,12 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
-from splap_editor.core.arap import ArapDeformer, ArapOptions
-from splap_editor.core.arap_problem import FREE, PIN, ArapProblem, Constraints, Pose
-from splap_editor.core.arap_scene import ArapScene
+from splap_editor.core.arap.arap import ArapDeformer, ArapOptions
+from splap_editor.core.arap.problem import FREE, PIN, ArapProblem, Constraints, Pose
+from splap_editor.core.arap.scene import ArapScene
 from splap_editor.core.deformer import Handles
-from splap_editor.core.morton import morton_order
-from splap_editor.core.splat_graph import SplatGraph
+from splap_editor.core.graph.splat_graph import SplatGraph
+from splap_editor.core.splats.morton import morton_order
 
 NEAR = 1e-3
 """How close to the minimiser counts as there, in units of the scene scale."""

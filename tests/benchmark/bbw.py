@@ -18,11 +18,11 @@ import piqp
 import scipy.sparse as sp
 from scipy.spatial import ConvexHull
 
-from splap_editor.core.bbw import BbwDeformer
-from splap_editor.core.bbw_weights import BbwOptions, BbwProblem, HandleWeight, bbw_problem, handle_weight
-from splap_editor.core.box_qp import box_qp
+from splap_editor.core.bbw.bbw import BbwDeformer
+from splap_editor.core.bbw.box_qp import box_qp
+from splap_editor.core.bbw.weights import BbwOptions, BbwProblem, HandleWeight, bbw_problem, handle_weight
 from splap_editor.core.deformer import Handles
-from splap_editor.core.morton import morton_order
+from splap_editor.core.splats.morton import morton_order
 from tests.benchmark.peers import note, report, timed
 from tests.reference.bbw import rigid
 

@@ -20,9 +20,9 @@ import robust_laplacian
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from splap_editor.core.occupancy import Ellipses, occupancy_ellipses
-from splap_editor.core.splat_graph import GraphOptions, SplatGraph, splat_graph
-from splap_editor.core.splats import Splats
+from splap_editor.core.graph.splat_graph import GraphOptions, SplatGraph, splat_graph
+from splap_editor.core.splats.occupancy import Ellipses, occupancy_ellipses
+from splap_editor.core.splats.splats import Splats
 from splap_editor.io.sample_maker import STYLES, shape_sample
 from splap_editor.io.sample_shapes import SHAPES
 from tests.benchmark.ground_truth import GroundTruth, Pull, plain_arap
@@ -77,9 +77,9 @@ def graph_figures(scene: Scene, graph: SplatGraph) -> dict[str, object]:
 
 def laplacians(scene: Scene, options: argparse.Namespace) -> Iterator[tuple[dict[str, object], sp.csr_matrix]]:
     """Yield each candidate's description and Laplacian."""
-    from splap_editor.core.geodesics import geodesic_neighbors
-    from splap_editor.core.laplacian import point_cloud_laplacian
-    from splap_editor.core.local_triangulation import local_triangulations
+    from splap_editor.core.surface.geodesics import geodesic_neighbors
+    from splap_editor.core.surface.laplacian import point_cloud_laplacian
+    from splap_editor.core.surface.local_triangulation import local_triangulations
 
     for rule in options.rules:
         graph = splat_graph(scene.ellipses, GraphOptions(rule=rule))
@@ -150,7 +150,7 @@ def settled(
     rest: NDArray[np.float64], L: sp.csr_matrix, constrained: NDArray[np.int64], targets: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Settle ARAP with the editor's own solver, on splats and on the mesh alike."""
-    from splap_editor.core.arap import ArapDeformer
+    from splap_editor.core.arap.arap import ArapDeformer
     from splap_editor.core.deformer import Handles
 
     moves = targets - rest[constrained]

@@ -15,12 +15,12 @@ from statistics import median
 import numpy as np
 import robust_laplacian
 
-from splap_editor.core.geodesics import geodesic_neighbors
-from splap_editor.core.laplacian import point_cloud_laplacian
-from splap_editor.core.local_triangulation import local_triangulations
-from splap_editor.core.occupancy import occupancy_ellipses
-from splap_editor.core.splat_graph import GraphOptions, splat_graph
-from splap_editor.core.splats import Splats
+from splap_editor.core.graph.splat_graph import GraphOptions, splat_graph
+from splap_editor.core.splats.occupancy import occupancy_ellipses
+from splap_editor.core.splats.splats import Splats
+from splap_editor.core.surface.geodesics import geodesic_neighbors
+from splap_editor.core.surface.laplacian import point_cloud_laplacian
+from splap_editor.core.surface.local_triangulation import local_triangulations
 from splap_editor.io.sample_maker import big_scene
 from tests.benchmark.peers import machine, peak_gib, report, timed
 

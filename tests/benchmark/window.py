@@ -26,9 +26,9 @@ from PySide6.QtWidgets import QApplication
 
 from splap_editor.app import make_window
 from splap_editor.core.handle_nodes import Region
+from splap_editor.engine.cache import StageCache
+from splap_editor.engine.edit import Pose
 from splap_editor.io.sample_maker import big_scene, write_sample
-from splap_editor.session.cache import StageCache
-from splap_editor.session.edit import Pose
 from splap_editor.ui.theme import apply_theme
 from splap_editor.ui.viewport_widget import surface_format
 from tests.benchmark.peers import machine, note, report, timed
@@ -43,7 +43,7 @@ start = float(sys.argv[1])
 from PySide6.QtGui import QSurfaceFormat
 from PySide6.QtWidgets import QApplication
 from splap_editor.app import make_window
-from splap_editor.ui.file_commands import sample_path
+from splap_editor.ui.actions.file_commands import sample_path
 from splap_editor.ui.theme import apply_theme
 from splap_editor.ui.viewport_widget import surface_format
 QSurfaceFormat.setDefaultFormat(surface_format())

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from splap_editor.core.splats import Splats
+from splap_editor.core.splats.splats import Splats
 
 SIGMA_CUT = float(np.sqrt(-2.0 * np.log(1.0 / 255.0 / 0.9)))
 """Semi-axis in standard deviations of a splat of opacity 0.9."""

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from splap_editor.core.handle_nodes import Region, handle_nodes
-from splap_editor.core.occupancy import Ellipses
+from splap_editor.core.splats.occupancy import Ellipses
 
 
 def _ellipses(centers, inert_rows=()):

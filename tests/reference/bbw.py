@@ -6,7 +6,7 @@ import scipy.sparse as sp
 from scipy.optimize import lsq_linear
 
 from splap_editor.core.deformer import Handles
-from splap_editor.core.splat_graph import SplatGraph
+from splap_editor.core.graph.splat_graph import SplatGraph
 
 
 def box_qp_dense(A, c, lower, upper):

@@ -8,10 +8,10 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import Delaunay, QhullError
 from scipy.spatial.transform import Rotation
 
-from splap_editor.core.geodesics import Neighborhoods
-from splap_editor.core.occupancy import Ellipses
-from splap_editor.core.splat_graph import SplatGraph
-from splap_editor.core.splats import Splats
+from splap_editor.core.graph.splat_graph import SplatGraph
+from splap_editor.core.splats.occupancy import Ellipses
+from splap_editor.core.splats.splats import Splats
+from splap_editor.core.surface.geodesics import Neighborhoods
 
 
 def occupancy_ellipse(splats: Splats, row: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

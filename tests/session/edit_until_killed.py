@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from splap_editor.core.handle_nodes import Region
+from splap_editor.engine.edit import Pose
 from splap_editor.session.autosave import Autosave
 from splap_editor.session.documents import Documents
-from splap_editor.session.edit import Pose
 from splap_editor.session.session import Session
 from tests.session.main_thread import MainThread
 

@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 
 from splap_editor.core.handle_nodes import Region
+from splap_editor.engine.edit import Pose
 from splap_editor.io.file_lock import FileLock
 from splap_editor.io.session_file import read_session_file, write_session_file
 from splap_editor.io.session_specs import PlySpec, SessionFile
 from splap_editor.resources import resource
 from splap_editor.session.autosave import Autosave
 from splap_editor.session.documents import Documents
-from splap_editor.session.edit import Pose
 from splap_editor.session.recovery import new_slot, orphans, recovery_folder
 from splap_editor.session.session import Session
 

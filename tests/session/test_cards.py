@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from splap_editor.core.ellipse_offset import normal_offsets, touch_scales
-from splap_editor.core.splat_graph import GraphOptions, splat_graph
+from splap_editor.core.graph.ellipse_offset import normal_offsets, touch_scales
+from splap_editor.core.graph.splat_graph import GraphOptions, splat_graph
+from splap_editor.engine.pipeline import surface_of
 from splap_editor.io.ply import read_ply
 from splap_editor.resources import resource
 from splap_editor.session.cards import edge_card, has_edge, splat_card
-from splap_editor.session.pipeline import surface_of
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from splap_editor.core.occupancy import occupancy_ellipses
+from splap_editor.core.splats.occupancy import occupancy_ellipses
 from splap_editor.io.ply import read_ply, write_ply
 from splap_editor.resources import resource
 from splap_editor.session.detective import oddities, reading, round_rows, verdict

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from splap_editor.core.handle_nodes import Region
+from splap_editor.engine.edit import Pose
+from splap_editor.engine.keyframes import edit_at_frame, keyed_edit
 from splap_editor.io.session_file import SessionFileError, read_session_file
 from splap_editor.io.session_specs import ViewSpec
 from splap_editor.resources import resource
 from splap_editor.session.commands import ChangeSelectionSets
 from splap_editor.session.documents import Documents, MissingPlyError
-from splap_editor.session.edit import Pose
-from splap_editor.session.keyframes import edit_at_frame, keyed_edit
 from splap_editor.session.placement import rows_region
 from splap_editor.session.saved_state import Look
 from splap_editor.session.session import Session

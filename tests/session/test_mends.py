@@ -9,16 +9,16 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from splap_editor.cli import main
-from splap_editor.core.ellipse_offset import touch_scales
-from splap_editor.core.occupancy import occupancy_ellipses
-from splap_editor.core.splat_graph import GraphOptions, mended_graph, splat_graph
+from splap_editor.core.graph.ellipse_offset import touch_scales
+from splap_editor.core.graph.splat_graph import GraphOptions, mended_graph, splat_graph
+from splap_editor.core.splats.occupancy import occupancy_ellipses
+from splap_editor.engine.edit import Edit
+from splap_editor.engine.recipe_edit import edit_of, recipe_of
 from splap_editor.io.ply import read_ply
 from splap_editor.io.recipe import read_recipe, write_recipe
 from splap_editor.resources import resource
 from splap_editor.session.cards import has_edge
-from splap_editor.session.edit import Edit
 from splap_editor.session.mends import best_links, edges_between, fragment_links, fragments, with_added, with_cut
-from splap_editor.session.recipe_edit import edit_of, recipe_of
 from tests.core.splat_scenes import joined, moved, sheet
 
 TUBE = resource("samples", "tube.ply")

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from splap_editor.cli import main as command_line
+from splap_editor.engine import surface_stages
+from splap_editor.engine.cache import StageCache
+from splap_editor.engine.edit import Pose
 from splap_editor.io.ply import read_ply
 from splap_editor.resources import resource
-from splap_editor.session import surface_stages, work
-from splap_editor.session.cache import StageCache
-from splap_editor.session.edit import Pose
+from splap_editor.session import work
 from splap_editor.session.placement import disc_rows, held_pose, rows_region
 from splap_editor.session.session import Session
 from tests.session.main_thread import MainThread
@@ -373,7 +374,7 @@ def test_weights_found_before_are_not_solved_for_again(main, opened, monkeypatch
     def refuse(*_, **__):
         raise AssertionError("solved although the cache has it")
 
-    monkeypatch.setattr("splap_editor.session.bbw_binding.handle_weight", refuse)
+    monkeypatch.setattr("splap_editor.engine.bbw_binding.handle_weight", refuse)
     opened.change_edit(replace(opened.scene.edit, blending="linear"), "Change blending")
     main.run_until(lambda: opened.state == "settled")
     assert opened.failures == []
@@ -394,7 +395,7 @@ def test_cancelling_the_weights_leaves_scene_and_cache_as_they_were(main, opened
         raise AssertionError("it was to be cancelled")
 
     with monkeypatch.context() as patched:
-        patched.setattr("splap_editor.session.bbw_binding.handle_weight", slow)
+        patched.setattr("splap_editor.engine.bbw_binding.handle_weight", slow)
         opened.change_edit(
             replace(scene.edit, handles=tuple(replace(h, cage_radius=None) for h in scene.edit.handles)), "Change cage"
         )

@@ -3,8 +3,8 @@
 from PySide6.QtGui import QKeySequence
 
 from splap_editor.resources import resource
-from splap_editor.ui.action_table import ACTIONS, MENUS
-from splap_editor.ui.help_sheet import HelpSheet
+from splap_editor.ui.actions.action_table import ACTIONS, MENUS
+from splap_editor.ui.dialogs.help_sheet import HelpSheet
 
 
 def test_ids_and_shortcuts_are_given_once():

@@ -4,9 +4,9 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
-from splap_editor.ui.action_table import ACTIONS
-from splap_editor.ui.command_palette import ENABLED, KEYS, CommandPalette, ranked, recent_actions
-from splap_editor.ui.fuzzy import fuzzy_score
+from splap_editor.ui.actions.action_table import ACTIONS
+from splap_editor.ui.dialogs.command_palette import ENABLED, KEYS, CommandPalette, ranked, recent_actions
+from splap_editor.ui.dialogs.fuzzy import fuzzy_score
 
 CTRL_SHIFT = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier
 

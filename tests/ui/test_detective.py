@@ -9,9 +9,9 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QMessageBox, QPushButton
 
 from splap_editor.core.handle_nodes import Region
+from splap_editor.engine.edit import Pose
 from splap_editor.io.ply import read_ply, write_ply
 from splap_editor.resources import resource
-from splap_editor.session.edit import Pose
 
 
 def choose(box, data):

@@ -9,11 +9,11 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QFileDialog, QMessageBox, QPushButton
 
 from splap_editor.core.handle_nodes import Region
+from splap_editor.engine.edit import Pose
 from splap_editor.io.session_file import read_session_file
 from splap_editor.resources import resource
 from splap_editor.session.autosave import Autosave
 from splap_editor.session.documents import Documents
-from splap_editor.session.edit import Pose
 from splap_editor.session.session import Session
 
 from .conftest import WAIT_MS, Driver

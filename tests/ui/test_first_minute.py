@@ -5,7 +5,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QApplication
 
 from splap_editor.io.ply import read_ply
-from splap_editor.ui.export_dialog import ExportDialog
+from splap_editor.ui.dialogs.export_dialog import ExportDialog
 from splap_editor.ui.main_window import HINT
 from splap_editor.viewport.gizmo_parts import ARROWS
 

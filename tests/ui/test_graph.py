@@ -5,8 +5,8 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
-from splap_editor.core.splat_graph import GraphOptions, splat_graph
-from splap_editor.core.splats import Splats
+from splap_editor.core.graph.splat_graph import GraphOptions, splat_graph
+from splap_editor.core.splats.splats import Splats
 from splap_editor.io.recipe import read_recipe
 from splap_editor.io.sample_maker import write_sample
 from splap_editor.session.cards import has_edge

@@ -11,8 +11,8 @@ from PySide6.QtGui import QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QApplication, QMessageBox, QPushButton
 
 from splap_editor.core.handle_nodes import Region
+from splap_editor.engine.edit import Pose
 from splap_editor.resources import resource
-from splap_editor.session.edit import Pose
 
 from .conftest import WAIT_MS, Driver
 
@@ -136,7 +136,7 @@ def test_closing_while_a_job_runs_exits_with_0(tmp_path, moment):
         from PySide6.QtWidgets import QApplication
         from splap_editor.app import make_window
         from splap_editor.core.handle_nodes import Region
-        from splap_editor.session.edit import Pose
+        from splap_editor.engine.edit import Pose
         from splap_editor.ui.viewport_widget import surface_format
         QSettings.setPath(QSettings.Format.NativeFormat, QSettings.Scope.UserScope, {str(tmp_path)!r})
         QSurfaceFormat.setDefaultFormat(surface_format())

@@ -8,12 +8,12 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
 from splap_editor.core.handle_nodes import Region
+from splap_editor.engine.edit import Pose
 from splap_editor.io.recipe import SolverSpec
-from splap_editor.session.edit import Pose
-from splap_editor.ui.number_field import NumberField, ScrubLabel
-from splap_editor.ui.options_form import OptionsForm
 from splap_editor.ui.panels.deformer_panel import SOLVER_HINTS
 from splap_editor.ui.panels.pose_form import PoseForm, euler_degrees, quat_of_euler
+from splap_editor.ui.widgets.number_field import NumberField, ScrubLabel
+from splap_editor.ui.widgets.options_form import OptionsForm
 
 
 @pytest.mark.parametrize("angles", [(10.0, 20.0, 30.0), (-170.0, 80.0, 5.0), (0.0, 90.0, 0.0), (33.0, -90.0, 0.0)])

@@ -5,7 +5,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QInputDialog
 
 from splap_editor.core.handle_nodes import Region
-from splap_editor.session.edit import Pose
+from splap_editor.engine.edit import Pose
 
 from .conftest import WAIT_MS
 

@@ -7,9 +7,9 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QComboBox
 
 from splap_editor.resources import resource
-from splap_editor.ui.number_field import NumberField
+from splap_editor.ui.dialogs.preferences_dialog import PreferencesDialog
 from splap_editor.ui.preferences import GB, MB, Preferences, _read
-from splap_editor.ui.preferences_dialog import PreferencesDialog
+from splap_editor.ui.widgets.number_field import NumberField
 
 
 def opened_page(driver):

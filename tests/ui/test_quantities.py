@@ -8,7 +8,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from splap_editor.tools.tool import PointerEvent
-from splap_editor.ui.export_dialog import ExportDialog
+from splap_editor.ui.dialogs.export_dialog import ExportDialog
 
 WAIT_MS = 60_000
 

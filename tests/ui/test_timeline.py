@@ -10,11 +10,11 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from splap_editor.core.handle_nodes import Region
+from splap_editor.engine.edit import Pose
 from splap_editor.io.ply import read_ply
-from splap_editor.session.edit import Pose
-from splap_editor.ui.frame_export import FrameOrder
-from splap_editor.ui.frames_dialog import FramesDialog
-from splap_editor.ui.timeline_strip import TimelineStrip
+from splap_editor.ui.dialogs.frames_dialog import FramesDialog
+from splap_editor.ui.timeline.frame_export import FrameOrder
+from splap_editor.ui.timeline.strip import TimelineStrip
 
 from .conftest import WAIT_MS
 

@@ -6,12 +6,12 @@ from PySide6.QtTest import QTest
 from scipy.spatial import cKDTree
 
 from splap_editor.cli import main as command_line
+from splap_editor.engine.edit import Pose
 from splap_editor.io.ply import read_ply
 from splap_editor.resources import resource
-from splap_editor.session.edit import Pose
 from splap_editor.session.placement import disc_rows, rows_region
 from splap_editor.session.weight_report import splat_weights
-from splap_editor.ui.number_field import ScrubLabel
+from splap_editor.ui.widgets.number_field import ScrubLabel
 from splap_editor.viewport.weight_colors import BAND_COLORS, REST_COLOR, weight_tints
 
 TUBE = resource("samples", "tube.ply")

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from splap_editor.core.occupancy import occupancy_ellipses
+from splap_editor.core.splats.occupancy import occupancy_ellipses
+from splap_editor.engine.quantities import QUANTITIES, Snapshot
 from splap_editor.io.ply import read_ply
 from splap_editor.resources import resource
-from splap_editor.session.quantities import QUANTITIES, Snapshot
 from splap_editor.viewport.colormaps import COLORMAPS
 from splap_editor.viewport.quantity_view import QuantityOptions, shown_quantity, value_text
 

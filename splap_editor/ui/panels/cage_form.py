@@ -3,9 +3,9 @@
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QCheckBox, QGridLayout, QWidget
 
-from splap_editor.ui.number_field import NumberField, ScrubLabel
-from splap_editor.ui.options_form import LABEL_PX
 from splap_editor.ui.theme import STEP
+from splap_editor.ui.widgets.number_field import NumberField, ScrubLabel
+from splap_editor.ui.widgets.options_form import LABEL_PX
 
 SMALLEST = 1e-6
 

@@ -6,13 +6,13 @@ import numpy as np
 from PySide6.QtCore import QEvent, QObject, Signal
 from PySide6.QtWidgets import QCheckBox, QComboBox, QGridLayout, QLabel, QVBoxLayout, QWidget
 
-from splap_editor.session.edit import Edit
+from splap_editor.engine.edit import Edit
 from splap_editor.session.scene import Scene
 from splap_editor.session.session import Session
-from splap_editor.ui.number_field import NumberField, set_tone
-from splap_editor.ui.options_form import FieldHint, OptionsForm, form_label
 from splap_editor.ui.panels.weights_form import WeightsForm
 from splap_editor.ui.theme import STEP
+from splap_editor.ui.widgets.number_field import NumberField, set_tone
+from splap_editor.ui.widgets.options_form import FieldHint, OptionsForm, form_label
 
 METHODS = {"arap": "As-rigid-as-possible", "bbw": "Bounded biharmonic weights"}
 

@@ -3,11 +3,11 @@
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QSlider, QToolButton, QVBoxLayout, QWidget
 
-from splap_editor.ui.actions import ActionSet
+from splap_editor.ui.actions.actions import ActionSet
 from splap_editor.ui.display import Display
-from splap_editor.ui.number_field import NumberField
-from splap_editor.ui.options_form import FieldHint, OptionsForm, form_label
 from splap_editor.ui.theme import STEP
+from splap_editor.ui.widgets.number_field import NumberField
+from splap_editor.ui.widgets.options_form import FieldHint, OptionsForm, form_label
 
 SLIDERS = {
     "size_factor": ("Size", 0.05, 2.0, 2, "1 draws each splat at its true size."),

@@ -17,14 +17,14 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from splap_editor.core.splat_graph import GraphOptions, SplatGraph
+from splap_editor.core.graph.splat_graph import GraphOptions, SplatGraph
 from splap_editor.session.graph_preview import GraphPreview
 from splap_editor.session.session import Session
-from splap_editor.ui.actions import ActionSet
-from splap_editor.ui.graph_commands import GraphCommands
-from splap_editor.ui.number_field import set_tone
-from splap_editor.ui.options_form import FieldHint, OptionsForm
+from splap_editor.ui.actions.actions import ActionSet
+from splap_editor.ui.actions.graph_commands import GraphCommands
 from splap_editor.ui.theme import STEP
+from splap_editor.ui.widgets.number_field import set_tone
+from splap_editor.ui.widgets.options_form import FieldHint, OptionsForm
 from splap_editor.viewport.graph_view import EDGE_COLORS, GraphView
 
 MOST_LISTED = 60

@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from splap_editor.session.edit import Handle, Pose
+from splap_editor.engine.edit import Handle, Pose
 from splap_editor.session.scene import Scene
 from splap_editor.session.session import Session
 from splap_editor.session.weight_report import cage_radius

@@ -6,14 +6,14 @@ import numpy as np
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QComboBox, QGridLayout, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
-from splap_editor.core.splat_graph import GraphOptions
+from splap_editor.core.graph.splat_graph import GraphOptions
 from splap_editor.session.cards import EdgeCard, SplatCard, edge_card, has_edge, splat_card
 from splap_editor.session.graph_preview import GraphPreview
 from splap_editor.session.neighbor_sets import NEIGHBOR_KINDS
 from splap_editor.session.session import Session
-from splap_editor.ui.number_field import NumberField
-from splap_editor.ui.options_form import form_label
 from splap_editor.ui.theme import STEP
+from splap_editor.ui.widgets.number_field import NumberField
+from splap_editor.ui.widgets.options_form import form_label
 from splap_editor.viewport.inspect_view import BOTH_COLOR, FIRST_COLOR, SECOND_COLOR, InspectView
 
 HINT = "Take the Inspect tool (I) and click a splat."

@@ -5,8 +5,8 @@ from PySide6.QtWidgets import QComboBox, QGridLayout, QWidget
 
 from splap_editor.io.layouts import AXIS_NAMES, suiting_layouts
 from splap_editor.io.ply import SplatFile
-from splap_editor.ui.options_form import form_label
 from splap_editor.ui.theme import STEP
+from splap_editor.ui.widgets.options_form import form_label
 
 AXIS_WORDS = {None: "Thinnest axis", 0: "Axis 0", 1: "Axis 1", 2: "Axis 2"}
 

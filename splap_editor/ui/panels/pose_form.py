@@ -5,10 +5,10 @@ from numpy.typing import ArrayLike, NDArray
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QWidget
 
-from splap_editor.core.rotations import matrices_to_quats, quats_to_matrices
-from splap_editor.session.edit import Pose
-from splap_editor.ui.number_field import NumberField, ScrubLabel
+from splap_editor.core.splats.rotations import matrices_to_quats, quats_to_matrices
+from splap_editor.engine.edit import Pose
 from splap_editor.ui.theme import STEP
+from splap_editor.ui.widgets.number_field import NumberField, ScrubLabel
 
 AXIS_COLORS = ("#f2746b", "#8fcf5f", "#6ea8ff")
 

@@ -3,13 +3,13 @@
 import numpy as np
 from PySide6.QtWidgets import QCheckBox, QComboBox, QGridLayout, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
-from splap_editor.session.quantities import QUANTITIES
+from splap_editor.engine.quantities import QUANTITIES
 from splap_editor.session.selection import SelectionMode, combined_selection
 from splap_editor.session.session import Session
-from splap_editor.ui.histogram import Histogram
-from splap_editor.ui.number_field import NumberField
-from splap_editor.ui.options_form import form_label
 from splap_editor.ui.theme import STEP
+from splap_editor.ui.widgets.histogram import Histogram
+from splap_editor.ui.widgets.number_field import NumberField
+from splap_editor.ui.widgets.options_form import form_label
 from splap_editor.viewport.colormaps import COLORMAPS
 from splap_editor.viewport.quantity_view import QuantityView
 

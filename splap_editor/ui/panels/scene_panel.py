@@ -3,15 +3,15 @@
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QGridLayout, QLabel, QVBoxLayout, QWidget
 
+from splap_editor.engine.scene_info import graph_info
 from splap_editor.session.detective import reading, verdict
 from splap_editor.session.scene import Scene
-from splap_editor.session.scene_info import graph_info
 from splap_editor.session.session import Session
-from splap_editor.ui.number_field import set_tone
-from splap_editor.ui.options_form import form_label
 from splap_editor.ui.panels.layout_form import LayoutForm
 from splap_editor.ui.panels.oddities_list import OdditiesList
 from splap_editor.ui.theme import STEP
+from splap_editor.ui.widgets.number_field import set_tone
+from splap_editor.ui.widgets.options_form import form_label
 
 ROWS = {
     "file": "File",

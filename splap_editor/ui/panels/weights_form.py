@@ -6,8 +6,8 @@ from PySide6.QtWidgets import QLabel, QSizePolicy, QToolButton, QVBoxLayout, QWi
 
 from splap_editor.session.session import Session
 from splap_editor.session.weight_report import weight_lines
-from splap_editor.ui.number_field import set_tone
 from splap_editor.ui.theme import STEP
+from splap_editor.ui.widgets.number_field import set_tone
 
 
 class WeightsForm(QWidget):

@@ -1,0 +1,1 @@
+"""Splats whose ellipses follow a deformed surface."""

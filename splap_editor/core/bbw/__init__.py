@@ -1,0 +1,1 @@
+"""Bounded biharmonic weights, and the blending that they are for."""

@@ -1,0 +1,1 @@
+"""The splat graph: which ellipses belong to the same piece of surface."""

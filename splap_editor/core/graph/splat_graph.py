@@ -1,0 +1,269 @@
+"""The splat graph: which ellipses belong to the same piece of surface."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+from splap_editor.core.graph.ellipse_offset import touch_scales
+from splap_editor.core.graph.ellipse_tree import EllipseTree, ellipse_tree, offset_pairs
+from splap_editor.core.graph.touch_rule import edge_keys, labels_by_size, touch_edges
+from splap_editor.core.progress import Progress, no_progress
+from splap_editor.core.splats.occupancy import Ellipses
+
+_LENGTH_FLOOR = 1e-9
+
+
+@dataclass(frozen=True)
+class GraphOptions:
+    """What makes two splats neighbours.
+
+    Parameters
+    ----------
+    rule : "touch" or "paper"
+        ``touch`` (default): each splat's best contacts, as far as they are
+        mutual, and the best contacts between what that leaves apart.
+        ``paper``: every pair with a normal-wise offset of at most ε.
+    epsilon : float
+        Tolerance along the normals in units of the scene scale.
+    k : int
+        Number of geodesic neighbours the Laplacian is built from.
+    cut, add : tuple of (int, int)
+        Edges taken out of and put into the finished graph, as pairs of file rows.
+    """
+
+    rule: Literal["touch", "paper"] = "touch"
+    epsilon: float = 0.005
+    k: int = 30
+    cut: tuple[tuple[int, int], ...] = ()
+    add: tuple[tuple[int, int], ...] = ()
+
+    def __post_init__(self):
+        if self.rule not in ("touch", "paper"):
+            raise ValueError(f'rule must be "touch" or "paper", got {self.rule!r}')
+        if not (np.isfinite(self.epsilon) and self.epsilon >= 0.0):
+            raise ValueError(f"epsilon must be a finite number, not negative, got {self.epsilon}")
+        if self.k < 3:
+            raise ValueError(f"k must be at least 3, got {self.k}")
+
+
+@dataclass(frozen=True, eq=False)
+class SplatGraph:
+    """Undirected graph on the nodes of `Ellipses` as symmetric compressed rows.
+
+    Parameters
+    ----------
+    indptr : (n + 1,) int32
+        Row starts.
+    indices : (nnz,) int32
+        Neighbours, ascending in each row; each edge appears at both ends.
+    lengths : (nnz,) float64
+        Distance of the centres in world units, at least 1e-9 of the scene
+        scale (coinciding centres).
+    touch : (nnz,) float64 or None
+        Touch scale of each entry if the rule is made from them.
+    epsilon : float
+        Tolerance in world units.
+    """
+
+    indptr: NDArray[np.int32]
+    indices: NDArray[np.int32]
+    lengths: NDArray[np.float64]
+    touch: NDArray[np.float64] | None
+    epsilon: float
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes n."""
+        return len(self.indptr) - 1
+
+    @property
+    def n_edges(self) -> int:
+        """Number of edges, each counted once."""
+        return len(self.indices) // 2
+
+    @cached_property
+    def degrees(self) -> NDArray[np.int32]:
+        """(n,) number of neighbours."""
+        return np.diff(self.indptr)
+
+    @cached_property
+    def components(self) -> NDArray[np.int32]:
+        """(n,) component of each node, numbered by falling size from 0; equal sizes by their first node."""
+        return labels_by_size(connected_components(self.matrix(), directed=False)[1])
+
+    @cached_property
+    def edges(self) -> NDArray[np.int32]:
+        """(n_edges, 2) nodes i < j of each edge, ascending."""
+        starts = np.repeat(np.arange(self.n_nodes, dtype=np.int32), self.degrees)
+        upper = starts < self.indices
+        return np.stack([starts[upper], self.indices[upper]], axis=1)
+
+    def matrix(self) -> sp.csr_array:
+        """Edge lengths as an (n, n) sparse matrix that shares this graph's arrays."""
+        return sp.csr_array((self.lengths, self.indices, self.indptr), shape=(self.n_nodes, self.n_nodes))
+
+
+def splat_graph(
+    ellipses: Ellipses, options: GraphOptions = GraphOptions(), *, progress: Progress = no_progress
+) -> SplatGraph:
+    """Connect ellipses that lie on the same piece of surface.
+
+    The paper's rule [1]_ joins every two whose normal-wise offset is at most ε
+    in one direction at least. Where two surfaces pass near each other, or splats
+    overhang the border of theirs, it also joins what only touches with its rim.
+
+    The touch rule, see `touch_edges`, keeps each splat's best contacts instead.
+
+    Parameters
+    ----------
+    ellipses : Ellipses
+        Occupancy ellipses of n nodes.
+    options : GraphOptions
+        Rule, tolerance and mended edges.
+    progress : Progress
+        Called with the share done.
+
+    Returns
+    -------
+    SplatGraph
+        Isolated nodes have no neighbours.
+
+    Raises
+    ------
+    ValueError
+        If a row of ``options.cut`` or ``options.add`` is not in the file or
+        belongs to an inert splat, or a pair joins a splat to itself.
+
+    References
+    ----------
+    .. [1] SpLap, 3DV 2026, Sec. 4.1 and supplement B.
+    """
+    epsilon = options.epsilon * ellipses.scene_scale
+    cut = _node_pairs(ellipses, options.cut, "cut")
+    add = _node_pairs(ellipses, options.add, "add")
+    tree = ellipse_tree(ellipses)
+    if options.rule == "paper":
+        edges, touch = _offset_edges(tree, epsilon, progress), None
+    else:
+        edges, touch = touch_edges(tree, epsilon, progress)
+    graph = _symmetric(ellipses, *_mended(ellipses, edges, touch, epsilon, cut, add), epsilon)
+    progress(1.0)
+    return graph
+
+
+def mended_graph(ellipses: Ellipses, graph: SplatGraph, options: GraphOptions) -> SplatGraph:
+    """Cut and add edges: what `splat_graph` gives with these options, without a search.
+
+    Parameters
+    ----------
+    ellipses : Ellipses
+        Occupancy ellipses of n nodes.
+    graph : SplatGraph
+        Theirs, made with the same rule and tolerance and with nothing cut or added.
+    options : GraphOptions
+        Names the edges; of those in both lists none stays.
+
+    Raises
+    ------
+    ValueError
+        As `splat_graph` does.
+    """
+    cut = _node_pairs(ellipses, options.cut, "cut")
+    add = _node_pairs(ellipses, options.add, "add")
+    upper = np.repeat(np.arange(graph.n_nodes, dtype=np.int32), graph.degrees) < graph.indices
+    touch = None if graph.touch is None else graph.touch[upper]
+    edges, touch = _mended(ellipses, graph.edges, touch, graph.epsilon, cut, add)
+    return _symmetric(ellipses, edges, touch, graph.epsilon)
+
+
+def require_mendable(ellipses: Ellipses, options: GraphOptions) -> None:
+    """Raise the ValueError that mending would, before any work."""
+    _node_pairs(ellipses, options.cut, "cut")
+    _node_pairs(ellipses, options.add, "add")
+
+
+def _mended(
+    ellipses: Ellipses,
+    edges: NDArray[np.int32],
+    touch: NDArray[np.float64] | None,
+    epsilon: float,
+    cut: NDArray[np.int32],
+    add: NDArray[np.int32],
+) -> tuple[NDArray[np.int32], NDArray[np.float64] | None]:
+    """Edges (E, 2) with some added and then some cut, and their touch scales if there are any."""
+    if len(add):
+        edges = np.concatenate([edges, add])
+        touch = None if touch is None else np.concatenate([touch, touch_scales(ellipses, add, epsilon)])
+    if len(cut):
+        kept = ~np.isin(edge_keys(edges, ellipses.n_nodes), edge_keys(cut, ellipses.n_nodes))
+        edges, touch = edges[kept], None if touch is None else touch[kept]
+    return edges, touch
+
+
+def _offset_edges(tree: EllipseTree, epsilon: float, progress: Progress) -> NDArray[np.int32]:
+    """(E, 2) edges of the paper's rule."""
+    buffer = np.empty((1 << 18, 2), np.int32)
+    chunks, start, n = [np.empty((0, 2), np.int32)], 0, len(tree.nodes)
+    while start < n:
+        end, count = offset_pairs(start, *tree.arrays, epsilon, buffer)
+        if end == start:
+            buffer = np.empty((2 * len(buffer), 2), np.int32)
+            continue
+        chunks.append(buffer[:count].copy())
+        start = end
+        progress(0.9 * start / n)
+    return np.concatenate(chunks)
+
+
+def _node_pairs(ellipses: Ellipses, rows: tuple[tuple[int, int], ...], name: str) -> NDArray[np.int32]:
+    """(E, 2) nodes of pairs of file rows."""
+    pairs = np.array(rows, np.int64).reshape(-1, 2)
+    flat = pairs.ravel()
+    unknown = flat[(flat < 0) | (flat >= ellipses.n_splats)]
+    if len(unknown):
+        raise ValueError(f"{name}: rows {_listed(unknown)} are not in the file, which has {ellipses.n_splats} splats")
+    nodes = ellipses.node_of_row[pairs]
+    inert = pairs[nodes < 0]
+    if len(inert):
+        raise ValueError(f"{name}: rows {_listed(inert)} are inert splats, which no edge can join")
+    if (pairs[:, 0] == pairs[:, 1]).any():
+        raise ValueError(f"{name}: row {pairs[pairs[:, 0] == pairs[:, 1]][0, 0]} is paired with itself")
+    return np.sort(nodes, axis=1).astype(np.int32)
+
+
+def _listed(rows: NDArray[np.int64]) -> str:
+    rows = np.unique(rows)
+    return ", ".join(map(str, rows[:5])) + (f" and {len(rows) - 5} more" if len(rows) > 5 else "")
+
+
+def _symmetric(
+    ellipses: Ellipses, edges: NDArray[np.int32], touch: NDArray[np.float64] | None, epsilon: float
+) -> SplatGraph:
+    """Lay undirected edges out as compressed rows, each at both ends."""
+    n = ellipses.n_nodes
+    _, once = np.unique(edge_keys(edges, n), return_index=True)
+    edges = edges[once]
+    # Zero is a legal touch scale but no legal entry of a sparse matrix: carry edge numbers instead.
+    numbers = np.arange(len(edges), dtype=np.int32)
+    both = sp.coo_array(
+        (
+            np.concatenate([numbers, numbers]),
+            (np.concatenate([edges[:, 0], edges[:, 1]]), np.concatenate([edges[:, 1], edges[:, 0]])),
+        ),
+        shape=(n, n),
+    ).tocsr()
+    both.sort_indices()
+    lengths = np.linalg.norm(ellipses.centers[edges[:, 0]] - ellipses.centers[edges[:, 1]], axis=1)
+    lengths = np.maximum(lengths, _LENGTH_FLOOR * ellipses.scene_scale)
+    return SplatGraph(
+        indptr=both.indptr.astype(np.int32, copy=False),
+        indices=both.indices.astype(np.int32, copy=False),
+        lengths=lengths[both.data],
+        touch=None if touch is None else touch[once][both.data],
+        epsilon=epsilon,
+    )

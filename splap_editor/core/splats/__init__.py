@@ -1,0 +1,1 @@
+"""Splats as files hold them, and the ellipses that they occupy."""

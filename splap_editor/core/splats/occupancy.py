@@ -1,0 +1,216 @@
+"""Occupancy ellipses: the part of each splat that is really there."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from splap_editor.core.splats.morton import morton_order
+from splap_editor.core.splats.rotations import quats_to_matrices
+from splap_editor.core.splats.splats import Splats
+
+MIN_CONTRIBUTION = 1.0 / 255.0
+"""Least opacity that a renderer with eight bits a channel can show."""
+
+NEEDLE_FLOOR = 1e-4
+"""Least minor semi-axis in units of the major one: a splat of zero width still has a plane and an area."""
+
+_LENGTHS = (1e-60, 1e60)
+"""Scales beyond these have squares that leave float64's range in products of four."""
+
+
+class InertReason(IntEnum):
+    """Why a splat takes no part in the graph; `ACTIVE` if it does."""
+
+    ACTIVE = 0
+    TRANSPARENT = 1
+    """Its opacity is at most the least visible one."""
+    THRESHOLD = 2
+    """Its cut-off V is 1 or more, which no kernel value reaches."""
+    NON_FINITE = 3
+    """A position, scale, rotation, opacity or cut-off is NaN, infinite or too large to compute with."""
+    ZERO_QUATERNION = 4
+    """Its rotation is undefined."""
+    ZERO_SIZE = 5
+    """Both in-plane scales are zero."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ellipses:
+    """Occupancy ellipses of the active splats, the nodes of everything that follows.
+
+    Nodes are numbered along a Morton curve through their centres, so that
+    neighbours in space are neighbours in memory.
+
+    Parameters
+    ----------
+    rows : (n,) int64
+        File row of each node.
+    centers : (n, 3) float64
+        Centres in world units.
+    semi_axes : (n, 2, 3) float64
+        Major and minor semi-axis as world vectors, at right angles.
+    normals : (n, 3) float64
+        Unit normals, right-handed with the semi-axes. Which side they point to
+        means nothing.
+    cutoffs : (n,) float64
+        ``√λ``: semi-axis in units of the splat's standard deviation.
+    axes : (n, 3) int8
+        Stored scale and rotation column that the major axis, the minor axis
+        and the normal come from.
+    scene_scale : float
+        Size s of the scene in world units, see `scene_scale`; positive.
+    n_splats : int
+        Number of splats N in the file, inert ones included.
+    inert : (N,) uint8
+        `InertReason` of each splat in file order.
+    """
+
+    rows: NDArray[np.int64]
+    centers: NDArray[np.float64]
+    semi_axes: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    cutoffs: NDArray[np.float64]
+    axes: NDArray[np.int8]
+    scene_scale: float
+    n_splats: int
+    inert: NDArray[np.uint8]
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of active splats n."""
+        return len(self.rows)
+
+    @cached_property
+    def node_of_row(self) -> NDArray[np.int64]:
+        """(N,) node of each file row, -1 for an inert splat."""
+        nodes = np.full(self.n_splats, -1, np.int64)
+        nodes[self.rows] = np.arange(self.n_nodes)
+        return nodes
+
+    @cached_property
+    def reaches(self) -> NDArray[np.float64]:
+        """(n,) major semi-axis in world units."""
+        return np.sqrt(np.einsum("ij,ij->i", self.semi_axes[:, 0], self.semi_axes[:, 0]))
+
+
+def occupancy_ellipses(splats: Splats, *, min_contribution: float = MIN_CONTRIBUTION) -> Ellipses:
+    """Ellipses on which the splats contribute visibly.
+
+    A kernel counts where it exceeds ``max(V, c / α)``, an ellipse with
+    semi-axes ``√λ σ``, ``λ = -2 ln max(V, c / α)`` [1]_. A splat with three
+    scales takes its two largest, unless the layout names the normal axis.
+
+    Parameters
+    ----------
+    splats : Splats
+        The scene, in file order.
+    min_contribution : float
+        Least visible contribution c, in (0, 1).
+
+    Returns
+    -------
+    Ellipses
+        One per active splat. A splat whose minor scale vanishes gets a width
+        of 1e-4 of its length. A file without an active splat yields none.
+
+    Raises
+    ------
+    ValueError
+        If ``min_contribution`` is outside (0, 1).
+
+    References
+    ----------
+    .. [1] SpLap, 3DV 2026, Eq. 4 and supplement A.
+    """
+    if not 0.0 < min_contribution < 1.0:
+        raise ValueError(f"min_contribution must lie between 0 and 1, got {min_contribution}")
+    with np.errstate(all="ignore"):
+        # Rows that overflow or hold NaN are found by their results.
+        scales, opacities = splats.scales, splats.opacities
+        axes = _ordered_axes(scales, splats.normal_axis)
+        sigmas = np.take_along_axis(scales, axes[:, :2].astype(np.int64), axis=1)
+        thresholds = np.zeros(splats.n_splats) if splats.thresholds is None else np.abs(splats.thresholds)
+        levels = np.maximum(thresholds.astype(np.float64), min_contribution / opacities)
+        inert = _inert_reasons(splats, sigmas, opacities, thresholds, min_contribution)
+        rows = np.flatnonzero(inert == InertReason.ACTIVE)
+        rows = rows[morton_order(np.asarray(splats.means[rows], np.float64))]
+    centers = np.ascontiguousarray(splats.means[rows], np.float64)
+    cutoffs = np.sqrt(-2.0 * np.log(levels[rows]))
+    axes = axes[rows]
+    columns = np.take_along_axis(
+        quats_to_matrices(np.asarray(splats.quats[rows], np.float64)).swapaxes(1, 2),
+        axes[:, :, None].astype(int),
+        axis=1,
+    )
+    major = cutoffs * sigmas[rows, 0]
+    minor = np.maximum(cutoffs * sigmas[rows, 1], NEEDLE_FLOOR * major)
+    semi_axes = columns[:, :2] * np.stack([major, minor], axis=1)[:, :, None]
+    scale = scene_scale(centers) or 2.0 * float(major.max(initial=0.0)) or 1.0
+    return Ellipses(
+        rows=rows,
+        centers=centers,
+        semi_axes=np.ascontiguousarray(semi_axes),
+        normals=np.cross(columns[:, 0], columns[:, 1]),
+        cutoffs=cutoffs,
+        axes=axes,
+        scene_scale=scale,
+        n_splats=splats.n_splats,
+        inert=inert,
+    )
+
+
+def scene_scale(points: NDArray[np.float64]) -> float:
+    """Size of a scene: the largest side of its bounding box, far floaters left out.
+
+    Points count that lie no farther outside the box of the middle 96 % (axis
+    by axis) than that box is long. So on a clean scene the result is the plain
+    bounding box's, and one splat in fifty flung away does not change it.
+
+    Parameters
+    ----------
+    points : (n, 3) float64
+        Centres in world units.
+
+    Returns
+    -------
+    float
+        World units; 0 if there are no points or all coincide.
+    """
+    if not len(points):
+        return 0.0
+    low, high = np.quantile(points, [0.02, 0.98], axis=0)
+    margin = float((high - low).max())
+    kept = points if margin == 0.0 else points[((points >= low - margin) & (points <= high + margin)).all(axis=1)]
+    return float((kept.max(axis=0) - kept.min(axis=0)).max())
+
+
+def _ordered_axes(scales: NDArray[np.float64], normal_axis: int | None) -> NDArray[np.int8]:
+    """(N, 3) stored columns of the major axis, the minor axis and the normal; equal scales keep their order."""
+    scales = np.where(np.isnan(scales), np.inf, scales)
+    if scales.shape[1] == 2:
+        scales = np.concatenate([scales, np.full((len(scales), 1), -1.0)], axis=1)
+    elif normal_axis is not None:
+        scales[:, normal_axis] = -1.0
+    return np.argsort(-scales, axis=1, kind="stable").astype(np.int8)
+
+
+def _inert_reasons(
+    splats: Splats,
+    sigmas: NDArray[np.float64],
+    opacities: NDArray[np.float64],
+    thresholds: NDArray[np.floating],
+    min_contribution: float,
+) -> NDArray[np.uint8]:
+    """(N,) reason why each splat is inert; where several hold, the one that says most about the file."""
+    reasons = np.zeros(splats.n_splats, np.uint8)
+    reasons[sigmas[:, 0] < _LENGTHS[0]] = InertReason.ZERO_SIZE
+    reasons[thresholds >= 1.0] = InertReason.THRESHOLD
+    reasons[min_contribution / opacities >= 1.0] = InertReason.TRANSPARENT
+    reasons[~np.any(splats.quats, axis=1)] = InertReason.ZERO_QUATERNION
+    finite = np.isfinite(opacities) & np.isfinite(thresholds) & (splats.scales < _LENGTHS[1]).all(axis=1)
+    finite &= np.isfinite(splats.quats).all(axis=1) & (np.abs(splats.means) < _LENGTHS[1]).all(axis=1)
+    reasons[~finite] = InertReason.NON_FINITE
+    return reasons

@@ -1,0 +1,1 @@
+"""What the graph says of the surface: distances, triangles, the Laplacian."""

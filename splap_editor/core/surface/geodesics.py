@@ -1,0 +1,298 @@
+"""Distances along the splat graph."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from splap_editor.core.graph.splat_graph import SplatGraph
+from splap_editor.core.progress import Progress, no_progress
+
+_CHUNK = 16384
+_BLOCK = 512
+
+
+@dataclass(frozen=True, eq=False)
+class Neighborhoods:
+    """Nearest nodes of every node by distance along the graph, itself left out, as compressed rows.
+
+    Parameters
+    ----------
+    indptr : (n + 1,) int32
+        Row starts.
+    indices : (nnz,) int32
+        Nodes by rising distance, equal ones by rising node.
+    distances : (nnz,) float64
+        World units.
+    """
+
+    indptr: NDArray[np.int32]
+    indices: NDArray[np.int32]
+    distances: NDArray[np.float64]
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes n."""
+        return len(self.indptr) - 1
+
+
+def geodesic_neighbors(
+    graph: SplatGraph, k: int = 30, *, nodes: NDArray[np.integer] | None = None, progress: Progress = no_progress
+) -> Neighborhoods:
+    """Find the k nearest nodes of every node by shortest path.
+
+    Parameters
+    ----------
+    graph : SplatGraph
+        n nodes.
+    k : int
+        Number of neighbours, at least 1.
+    nodes : (m,) int, optional
+        Ascending; only of these.
+    progress : Progress
+        Called with the share done.
+
+    Returns
+    -------
+    Neighborhoods
+        A component of fewer than k + 1 nodes gives fewer neighbours, an isolated node none. With ``nodes`` it has m
+        rows.
+
+    Raises
+    ------
+    ValueError
+        If ``k`` is not positive.
+    """
+    if k < 1:
+        raise ValueError(f"k must be at least 1, got {k}")
+    sources = np.arange(graph.n_nodes) if nodes is None else np.ascontiguousarray(nodes, np.int64)
+    tentative = np.full((nb.get_num_threads(), graph.n_nodes), np.inf)
+    counts = [np.empty(0, np.int32)]
+    indices, distances = [np.empty(0, np.int32)], [np.empty(0)]
+    for start in range(0, len(sources), _CHUNK):
+        chunk = sources[start : start + _CHUNK]
+        near, far = np.empty((len(chunk), k), np.int32), np.empty((len(chunk), k))
+        counts.append(np.zeros(len(chunk), np.int32))
+        _nearest(chunk, graph.indptr, graph.indices, graph.lengths, tentative, near, far, counts[-1])
+        found = np.arange(k) < counts[-1][:, None]
+        indices.append(near[found])
+        distances.append(far[found])
+        progress((start + len(chunk)) / len(sources))
+    indptr = np.concatenate([[0], np.cumsum(np.concatenate(counts))]).astype(np.int32)
+    return Neighborhoods(indptr, np.concatenate(indices), np.concatenate(distances))
+
+
+def node_runs(n_nodes: int, nodes: NDArray[np.integer] | None, most: int) -> Iterator[tuple[int, int]]:
+    """Part nodes into runs without a gap, as pairs of first and last + 1.
+
+    Parameters
+    ----------
+    n_nodes : int
+        Number of nodes n.
+    nodes : (m,) int, optional
+        Ascending; all n without.
+    most : int
+        Longest run.
+    """
+    if nodes is None:
+        edges = [(0, n_nodes)] if n_nodes else []
+    else:
+        breaks = np.flatnonzero(np.diff(nodes) != 1) + 1
+        edges = [(int(run[0]), int(run[-1]) + 1) for run in np.split(np.asarray(nodes), breaks) if len(run)]
+    for first, last in edges:
+        for start in range(first, last, most):
+            yield start, min(start + most, last)
+
+
+def mended_neighborhoods(
+    graph: SplatGraph, before: Neighborhoods, ends: NDArray[np.integer], k: int
+) -> tuple[Neighborhoods, NDArray[np.int64]]:
+    """Bring neighbourhoods up to date after edges were cut or added.
+
+    A truncated search that settles no end of a changed edge meets the same
+    edges as before in the same order, so its result stands, to the bit. Only
+    the other nodes are searched again.
+
+    Parameters
+    ----------
+    graph : SplatGraph
+        After the change.
+    before : Neighborhoods
+        From before it, with the same ``k``.
+    ends : (m,) int
+        Nodes at the ends of changed edges.
+    k : int
+        Number of neighbours.
+
+    Returns
+    -------
+    neighborhoods : Neighborhoods
+        What `geodesic_neighbors` gives.
+    nodes : (a,) int64
+        Those searched again, ascending.
+    """
+    is_end = np.zeros(graph.n_nodes, np.int64)
+    is_end[ends] = 1
+    totals = np.concatenate([[0], np.cumsum(is_end[before.indices])])
+    is_stale = (totals[before.indptr[1:]] > totals[before.indptr[:-1]]) | (is_end > 0)
+    nodes = np.flatnonzero(is_stale)
+    found = geodesic_neighbors(graph, k, nodes=nodes)
+    counts = np.diff(before.indptr)
+    kept_before = np.repeat(~is_stale, counts)
+    counts[nodes] = np.diff(found.indptr)
+    kept = np.repeat(~is_stale, counts)
+    indices, distances = np.empty(len(kept), np.int32), np.empty(len(kept))
+    indices[kept], indices[~kept] = before.indices[kept_before], found.indices
+    distances[kept], distances[~kept] = before.distances[kept_before], found.distances
+    indptr = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+    return Neighborhoods(indptr, indices, distances), nodes
+
+
+def geodesic_distances(
+    graph: SplatGraph, sources: NDArray[np.integer], *, limit: float = np.inf
+) -> NDArray[np.float64]:
+    """Distance of every node from the nearest of some nodes.
+
+    Parameters
+    ----------
+    graph : SplatGraph
+        n nodes.
+    sources : (S,) int
+        Nodes at distance 0.
+    limit : float
+        Largest distance of interest in world units.
+
+    Returns
+    -------
+    (n,) float64
+        World units; inf beyond the limit and where no path leads.
+
+    Raises
+    ------
+    ValueError
+        If a source is not a node.
+    """
+    sources = np.ascontiguousarray(sources, np.int64)
+    if len(sources) and not (sources.min() >= 0 and sources.max() < graph.n_nodes):
+        raise ValueError(f"sources must be nodes 0 to {graph.n_nodes - 1}, got {sources.min()} to {sources.max()}")
+    return _spread(sources, graph.indptr, graph.indices, graph.lengths, float(limit))
+
+
+@nb.njit(nogil=True, cache=True)
+def _push(heap_keys, heap_nodes, size, key, node):
+    """Put an entry into a binary heap ordered by key, then node; returns its arrays, longer ones if they were full."""
+    if size == len(heap_keys):
+        keys, nodes = np.empty(2 * size), np.empty(2 * size, np.int32)
+        for i in range(size):
+            keys[i], nodes[i] = heap_keys[i], heap_nodes[i]
+        heap_keys, heap_nodes = keys, nodes
+    i = size
+    while i > 0:
+        up = (i - 1) >> 1
+        if heap_keys[up] < key or (heap_keys[up] == key and heap_nodes[up] <= node):
+            break
+        heap_keys[i], heap_nodes[i] = heap_keys[up], heap_nodes[up]
+        i = up
+    heap_keys[i], heap_nodes[i] = key, node
+    return heap_keys, heap_nodes
+
+
+@nb.njit(nogil=True, cache=True)
+def _drop_first(heap_keys, heap_nodes, size):
+    """Take the least entry out of a heap that holds ``size`` more."""
+    key, node = heap_keys[size], heap_nodes[size]
+    i = 0
+    while True:
+        down = 2 * i + 1
+        if down >= size:
+            break
+        if down + 1 < size and (
+            heap_keys[down + 1] < heap_keys[down]
+            or (heap_keys[down + 1] == heap_keys[down] and heap_nodes[down + 1] < heap_nodes[down])
+        ):
+            down += 1
+        if heap_keys[down] > key or (heap_keys[down] == key and heap_nodes[down] >= node):
+            break
+        heap_keys[i], heap_nodes[i] = heap_keys[down], heap_nodes[down]
+        i = down
+    heap_keys[i], heap_nodes[i] = key, node
+
+
+@nb.njit(nogil=True, cache=True, parallel=True)
+def _nearest(sources, indptr, indices, lengths, tentative, near, far, counts):
+    """Truncated Dijkstra from each of some nodes: rows of the k nearest and how many there are.
+
+    ``tentative`` has a row per thread that is inf everywhere, before and after. In Morton order the part of it one
+    search touches stays in the processor's cache, which makes a plain array faster than a hash table.
+    """
+    for block in nb.prange((len(near) + _BLOCK - 1) // _BLOCK):
+        best = tentative[nb.get_thread_id()]
+        heap_keys, heap_nodes = np.empty(1024), np.empty(1024, np.int32)
+        for row in range(block * _BLOCK, min((block + 1) * _BLOCK, len(near))):
+            heap_keys, heap_nodes = _search(
+                sources[row], indptr, indices, lengths, best, heap_keys, heap_nodes, near[row], far[row], counts[row:]
+            )
+
+
+@nb.njit(nogil=True, cache=True)
+def _search(source, indptr, indices, lengths, tentative, heap_keys, heap_nodes, near, far, count):
+    """One truncated Dijkstra; returns the heap's arrays, which may have grown."""
+    tentative[source] = 0.0
+    heap_keys[0], heap_nodes[0], size, found = 0.0, source, 1, -1
+    while size > 0:
+        distance, node = heap_keys[0], heap_nodes[0]
+        size -= 1
+        _drop_first(heap_keys, heap_nodes, size)
+        if distance > tentative[node]:
+            continue
+        if found >= 0:
+            near[found], far[found] = node, distance
+        found += 1
+        if found == len(near):
+            break
+        for e in range(indptr[node], indptr[node + 1]):
+            other, reached = indices[e], distance + lengths[e]
+            if reached < tentative[other]:
+                tentative[other] = reached
+                heap_keys, heap_nodes = _push(heap_keys, heap_nodes, size, reached, other)
+                size += 1
+    count[0] = found
+    # What the search touched is the source, what it settled, and the neighbours of all but the last of these.
+    _forget(source, indptr, indices, tentative)
+    for i in range(found):
+        _forget(near[i], indptr, indices, tentative)
+    return heap_keys, heap_nodes
+
+
+@nb.njit(nogil=True, cache=True)
+def _forget(node, indptr, indices, tentative):
+    tentative[node] = np.inf
+    for e in range(indptr[node], indptr[node + 1]):
+        tentative[indices[e]] = np.inf
+
+
+@nb.njit(nogil=True, cache=True)
+def _spread(sources, indptr, indices, lengths, limit):
+    """Dijkstra from several sources at once."""
+    tentative = np.full(len(indptr) - 1, np.inf)
+    heap_keys, heap_nodes, size = np.empty(1024), np.empty(1024, np.int32), 0
+    for source in sources:
+        if tentative[source] > 0.0:
+            tentative[source] = 0.0
+            heap_keys, heap_nodes = _push(heap_keys, heap_nodes, size, 0.0, np.int32(source))
+            size += 1
+    while size > 0:
+        distance, node = heap_keys[0], heap_nodes[0]
+        size -= 1
+        _drop_first(heap_keys, heap_nodes, size)
+        if distance > tentative[node]:
+            continue
+        for e in range(indptr[node], indptr[node + 1]):
+            other, reached = indices[e], distance + lengths[e]
+            if reached < tentative[other] and reached <= limit:
+                tentative[other] = reached
+                heap_keys, heap_nodes = _push(heap_keys, heap_nodes, size, reached, other)
+                size += 1
+    return tentative

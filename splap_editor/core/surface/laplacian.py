@@ -1,0 +1,167 @@
+"""The Laplacian and mass matrix of a splat scene."""
+
+from typing import Literal
+
+import numpy as np
+import robust_laplacian
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
+
+from splap_editor.core.graph.splat_graph import SplatGraph
+
+BRIDGE_WEIGHT = 0.5
+"""Weight of a graph edge that stands in for triangles; about the cotangent weight 0.58 of an equilateral mesh."""
+
+MASS_FLOOR = 1e-2
+"""Least mass in units of the median."""
+
+
+def point_cloud_laplacian(
+    centers: NDArray[np.float64],
+    triangles: NDArray[np.integer],
+    *,
+    graph: SplatGraph | None = None,
+    method: Literal["stars", "robust"] = "stars",
+) -> tuple[sp.csr_array, NDArray[np.float64]]:
+    """Cotangent Laplacian and lumped mass from the union of local Delaunay stars.
+
+    A triangle that its corners agree on is found by each of them, so both are
+    divided by 3 [1]_. ``stars`` sums the cotangents as they are and sets the few
+    negative weights, which disagreeing or obtuse triangles leave, to zero;
+    ``robust`` hands the union to the intrinsic Delaunay Laplacian for
+    non-manifold meshes [2]_, whose weights are not negative by construction.
+
+    Triangles do not reach everything the graph connects: splats in a line have
+    none, and two patches may meet in one edge. The shortest graph edges that
+    join such parts get a fixed weight, so L connects just what the graph does.
+
+    Parameters
+    ----------
+    centers : (n, 3) float64
+        Node positions in world units.
+    triangles : (T, 3) int
+        Union of all stars, see `local_triangulations`.
+    graph : SplatGraph, optional
+        The graph the stars come from; without it parts stay apart.
+    method : "stars" or "robust"
+        How the union becomes a Laplacian.
+
+    Returns
+    -------
+    L : (n, n) csr_array of float64
+        Symmetric, positive semidefinite, with zero row sums; ``-L[i, j]`` is
+        the weight of edge ij, positive, dimensionless. int32 indices, sorted, with every diagonal entry.
+    M : (n,) float64
+        Diagonal of the mass matrix: a third of the triangles' areas, in
+        squared world units, at least 1 % of the median. Without any triangle,
+        the mean squared length of the graph's edges; 1 if it has none.
+
+    Raises
+    ------
+    ValueError
+        If an array has another shape or ``method`` is unknown.
+
+    References
+    ----------
+    .. [1] SpLap, 3DV 2026, Sec. 4.2.
+    .. [2] Sharp and Crane, "A Laplacian for Nonmanifold Triangle Meshes", SGP 2020.
+    """
+    if centers.ndim != 2 or centers.shape[1] != 3:
+        raise ValueError(f"centers must have shape (n, 3), got {centers.shape}")
+    if triangles.ndim != 2 or triangles.shape[1] != 3:
+        raise ValueError(f"triangles must have shape (T, 3), got {triangles.shape}")
+    if method not in ("stars", "robust"):
+        raise ValueError(f'method must be "stars" or "robust", got {method!r}')
+    if graph is not None and graph.n_nodes != len(centers):
+        raise ValueError(f"graph must have {len(centers)} nodes, got {graph.n_nodes}")
+    weights, masses = (_star_weights if method == "stars" else _robust_weights)(centers, triangles)
+    if graph is not None:
+        weights = weights + _bridges(weights, graph)
+    return _laplacian_of(weights), _floored(masses, graph)
+
+
+def _star_weights(
+    centers: NDArray[np.float64], triangles: NDArray[np.integer]
+) -> tuple[sp.csr_array, NDArray[np.float64]]:
+    """(n, n) symmetric weights, not negative, and (n,) masses by summing cotangents."""
+    n = len(centers)
+    corners = [centers[triangles[:, c]] for c in range(3)]
+    # sides[c] is opposite to corner c.
+    sides = [corners[2] - corners[1], corners[0] - corners[2], corners[1] - corners[0]]
+    areas = 0.5 * np.linalg.norm(np.cross(sides[0], sides[1]), axis=1)
+    squares = [np.einsum("ij,ij->i", side, side) for side in sides]
+    # Collinear corners have no area: the floor keeps their cotangents, of both signs, finite.
+    doubled = 2.0 * np.maximum(areas, 1e-9 * np.maximum(np.maximum(squares[0], squares[1]), squares[2]))
+    upper = None
+    for c in range(3):
+        a, b = triangles[:, (c + 1) % 3], triangles[:, (c + 2) % 3]
+        cotangents = -np.einsum("ij,ij->i", sides[(c + 1) % 3], sides[(c + 2) % 3]) / doubled
+        part = sp.coo_array((cotangents / 6.0, (np.minimum(a, b), np.maximum(a, b))), shape=(n, n)).tocsr()
+        upper = part if upper is None else upper + part
+    upper.data = np.maximum(upper.data, 0.0)
+    masses = sum(np.bincount(triangles[:, c], areas / 9.0, n) for c in range(3))
+    return (upper + upper.T).tocsr(), masses
+
+
+def _robust_weights(
+    centers: NDArray[np.float64], triangles: NDArray[np.integer]
+) -> tuple[sp.csr_array, NDArray[np.float64]]:
+    """(n, n) symmetric weights, not negative, and (n,) masses by Sharp and Crane's method."""
+    n = len(centers)
+    # The library refuses corners that no triangle uses.
+    used, faces = np.unique(triangles, return_inverse=True)
+    if not len(used):
+        return sp.csr_array((n, n)), np.zeros(n)
+    L, M = robust_laplacian.mesh_laplacian(centers[used], faces.reshape(-1, 3))
+    L = L.tocoo()
+    off = L.row != L.col
+    rows, columns = used[L.row[off]], used[L.col[off]]
+    weights = sp.coo_array((np.maximum(-L.data[off], 0.0) / 3.0, (rows, columns)), shape=(n, n)).tocsr()
+    masses = np.zeros(n)
+    masses[used] = M.diagonal() / 3.0
+    return 0.5 * (weights + weights.T), masses
+
+
+def _bridges(weights: sp.csr_array, graph: SplatGraph) -> sp.csr_array:
+    """Weights of the shortest graph edges that join what the triangles leave apart."""
+    n = graph.n_nodes
+    weights.eliminate_zeros()
+    n_parts, parts = connected_components(weights, directed=False)
+    between = parts[graph.edges[:, 0]] != parts[graph.edges[:, 1]]
+    edges = graph.edges[between]
+    lengths = graph.lengths[np.repeat(np.arange(n), graph.degrees) < graph.indices][between]
+    # One candidate per two parts: the shortest, of equal ones that of the lowest nodes.
+    pairs = np.sort(parts[edges], axis=1)
+    order = np.lexsort((edges[:, 1], edges[:, 0], lengths, pairs[:, 1], pairs[:, 0]))
+    _, first = np.unique(pairs[order] @ np.array([n_parts, 1], np.int64), return_index=True)
+    best = order[first]
+    ranks = np.empty(len(best))
+    # Ranks for weights: distinct, so that the forest is, and not zero, which would be no edge.
+    ranks[np.lexsort((edges[best, 1], edges[best, 0], lengths[best]))] = np.arange(1, len(best) + 1)
+    forest = minimum_spanning_tree(sp.csr_array((ranks, (pairs[best, 0], pairs[best, 1])), shape=(n_parts, n_parts)))
+    chosen = edges[best][np.isin(ranks, forest.data)]
+    bridges = sp.csr_array((np.full(len(chosen), BRIDGE_WEIGHT), (chosen[:, 0], chosen[:, 1])), shape=(n, n))
+    return bridges + bridges.T
+
+
+def _laplacian_of(weights: sp.csr_array) -> sp.csr_array:
+    """Diagonal minus weights, with zero row sums and a full diagonal."""
+    weights.eliminate_zeros()
+    n = weights.shape[0]
+    everything = np.arange(n, dtype=np.int32)
+    starts = np.repeat(everything, np.diff(weights.indptr))
+    rows, columns = np.concatenate([starts, everything]), np.concatenate([weights.indices, everything])
+    values = np.concatenate([-weights.data, np.bincount(starts, weights.data, n)])
+    L = sp.coo_array((values, (rows, columns.astype(np.int32, copy=False))), shape=(n, n)).tocsr()
+    L.sort_indices()
+    return L
+
+
+def _floored(masses: NDArray[np.float64], graph: SplatGraph | None) -> NDArray[np.float64]:
+    """Masses with a floor, so that dividing by them is safe."""
+    positive = masses[masses > 0.0]
+    if len(positive):
+        return np.maximum(masses, MASS_FLOOR * np.median(positive))
+    area = 1.0 if graph is None or not graph.n_edges else float(np.mean(graph.lengths**2))
+    return np.full(len(masses), area)

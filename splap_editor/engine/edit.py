@@ -1,0 +1,165 @@
+"""The edit: handles and their poses, pins and options, as one immutable value."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from splap_editor.core.graph.splat_graph import GraphOptions
+from splap_editor.core.handle_nodes import Region
+from splap_editor.engine.pose import Pose
+from splap_editor.engine.timeline import Timeline
+from splap_editor.io.recipe import SolverSpec
+
+HANDLE_COLORS = ("#f2a93b", "#4fb3ff", "#7bd66b", "#e66fb0", "#b18cff", "#ff7a59", "#49d3c2", "#d9d24a")
+"""Handle colours in the order they are given out; told apart by the colour-blind too when neighbours in the list."""
+
+
+@dataclass(frozen=True, eq=False)
+class Handle:
+    """Splats that the artist moves, and where to.
+
+    Parameters
+    ----------
+    handle_id : int
+        Stays the same through every change; never used twice in a session.
+    name, color : str
+        As listed; the colour as ``#rrggbb``.
+    region : Region
+        The splats, by centre and radius or by file rows. Compared by identity: a change of region is a new object.
+    pose : Pose
+        About the region's centre.
+    enabled : bool
+        A disabled handle neither moves nor holds anything and is not in the recipe.
+    cage_radius : float or None
+        Reach of the handle's bounded biharmonic weight in world units; None for the whole object, NaN for the default.
+    """
+
+    handle_id: int
+    name: str
+    color: str
+    region: Region
+    pose: Pose = field(default_factory=Pose)
+    enabled: bool = True
+    cage_radius: float | None = float("nan")
+
+    @property
+    def transform(self) -> NDArray[np.float64]:
+        """(4, 4) world transform of the pose."""
+        return self.pose.matrix(np.asarray(self.region.center, np.float64))
+
+
+@dataclass(frozen=True, eq=False)
+class Edit:
+    """Everything that decides the pose, as one immutable value; undo swaps references to it.
+
+    Parameters
+    ----------
+    handles : tuple of Handle
+    pins : tuple of Region
+        Splats that stay put.
+    method : str
+        ``"arap"`` or ``"bbw"``.
+    graph : GraphOptions
+    free_radius : float or None or NaN
+        World units; None frees everything that is not pinned, NaN is the default of half the scene scale.
+    solver : SolverSpec
+    adaptation : str
+        ``"surface"``, ``"affine"`` or ``"none"``.
+    hops : int
+        Neighbourhood of the affine adaptation.
+    blending : str
+        ``"dual-quaternion"`` or ``"linear"``, for bounded biharmonic weights.
+    timeline : Timeline
+        Poses at other frames than the one shown.
+    """
+
+    handles: tuple[Handle, ...] = ()
+    pins: tuple[Region, ...] = ()
+    method: str = "arap"
+    graph: GraphOptions = field(default_factory=GraphOptions)
+    free_radius: float | None = float("nan")
+    solver: SolverSpec = field(default_factory=SolverSpec)
+    adaptation: str = "surface"
+    hops: int = 1
+    blending: str = "dual-quaternion"
+    timeline: Timeline = field(default_factory=Timeline)
+
+    @property
+    def active_handles(self) -> tuple[Handle, ...]:
+        """The enabled handles."""
+        return tuple(handle for handle in self.handles if handle.enabled)
+
+    @property
+    def transforms(self) -> NDArray[np.float64]:
+        """(H, 4, 4) world transforms of the enabled handles."""
+        return np.array([handle.transform for handle in self.active_handles]).reshape(-1, 4, 4)
+
+    @property
+    def is_identity(self) -> bool:
+        """Whether no enabled handle is moved."""
+        return all(handle.pose.is_identity for handle in self.active_handles)
+
+    def handle(self, handle_id: int) -> Handle:
+        """Find a handle by its id; KeyError when there is none."""
+        for handle in self.handles:
+            if handle.handle_id == handle_id:
+                return handle
+        raise KeyError(handle_id)
+
+    def with_handle(self, changed: Handle) -> "Edit":
+        """Replace the handle of the same id, or append it."""
+        if any(handle.handle_id == changed.handle_id for handle in self.handles):
+            return replace(
+                self, handles=tuple(changed if h.handle_id == changed.handle_id else h for h in self.handles)
+            )
+        return replace(self, handles=(*self.handles, changed))
+
+    def without_handles(self, handle_ids: Iterable[int]) -> "Edit":
+        """Drop the handles of these ids."""
+        gone = set(handle_ids)
+        return replace(self, handles=tuple(h for h in self.handles if h.handle_id not in gone))
+
+    def with_poses(self, poses: dict[int, Pose]) -> "Edit":
+        """Pose some handles, by id."""
+        return replace(
+            self,
+            handles=tuple(replace(h, pose=poses[h.handle_id]) if h.handle_id in poses else h for h in self.handles),
+        )
+
+    def next_handle_id(self) -> int:
+        """Give an id that no handle of this edit has, nor any of its keys."""
+        keyed = (handle_id for key in self.timeline.keys for handle_id in key.poses)
+        return max((*(handle.handle_id for handle in self.handles), *keyed), default=0) + 1
+
+
+def binds_like(a: Edit, b: Edit) -> bool:
+    """Whether a deformer bound for one edit serves the other: same regions, pins and options it uses, any pose."""
+    if (a.method, a.graph) != (b.method, b.graph) or len(a.pins) != len(b.pins):
+        return False
+    has_cages = a.method == "bbw"
+    if has_cages and a.blending != b.blending:
+        return False
+    if not has_cages and (a.solver != b.solver or not _same_number(a.free_radius, b.free_radius)):
+        return False
+    left, right = a.active_handles, b.active_handles
+    return (
+        len(left) == len(right)
+        and all(x is y for x, y in zip(a.pins, b.pins, strict=True))
+        and all(
+            x.region is y.region and (not has_cages or _same_number(x.cage_radius, y.cage_radius))
+            for x, y in zip(left, right, strict=True)
+        )
+    )
+
+
+def poses_like(a: Edit, b: Edit) -> bool:
+    """Whether two edits that bind alike also give the same kernels."""
+    return (a.adaptation, a.hops) == (b.adaptation, b.hops) and [h.pose for h in a.active_handles] == [
+        h.pose for h in b.active_handles
+    ]
+
+
+def _same_number(a: float | None, b: float | None) -> bool:
+    return a == b or (a is not None and b is not None and np.isnan(a) and np.isnan(b))

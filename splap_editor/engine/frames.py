@@ -1,0 +1,150 @@
+"""The frames of an edit's timeline: posed, and written one file each."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels, adapted_splats
+from splap_editor.core.deformer import Deformer
+from splap_editor.core.progress import Progress, no_progress
+from splap_editor.engine.cache import StageCache
+from splap_editor.engine.edit import Edit
+from splap_editor.engine.keyframes import edit_at_frame
+from splap_editor.engine.pipeline import Surface, deformer_of, handles_of, kernels_of
+from splap_editor.engine.timeline import LAST_FRAME
+from splap_editor.io.ply import SplatFile, write_ply
+
+
+@dataclass(frozen=True, eq=False)
+class FramePoser:
+    """Poses an edit as at any frame of its timeline, each by itself and settled.
+
+    Parameters
+    ----------
+    surface : Surface or None
+        None where no handle is enabled.
+    edit : Edit
+    deformer : Deformer or None
+        Bound for the edit; None where no handle is enabled.
+    """
+
+    surface: Surface | None
+    edit: Edit
+    deformer: Deformer | None
+
+    def kernels(self, frame: int | None, *, progress: Progress = no_progress) -> AdaptedKernels | None:
+        """Adapted kernels at a frame, or of the poses that the edit itself holds; None without a handle."""
+        if self.deformer is None:
+            return None
+        posed = self.edit if frame is None else edit_at_frame(self.edit, frame)
+        return kernels_of(self.surface, posed, self.deformer.solve(posed.transforms, progress=progress))
+
+
+def frame_poser(
+    surface: Surface | None, edit: Edit, *, cache: StageCache | None = None, progress: Progress = no_progress
+) -> FramePoser:
+    """Bind the deformer of an edit; ``surface`` is needed where it has an enabled handle."""
+    if not edit.active_handles:
+        return FramePoser(None, edit, None)
+    return FramePoser(
+        surface, edit, deformer_of(surface, edit, handles_of(surface, edit), cache=cache, progress=progress)
+    )
+
+
+def frame_range(text: str, n_frames: int) -> range:
+    """Frames named as ``"7"``, ``"3-40"``, ``"3-"`` to the last, or ``""`` for all.
+
+    Raises
+    ------
+    ValueError
+        If the text says something else, or no frame.
+    """
+    first, dash, last = text.strip().partition("-")
+    try:
+        start = int(first) if first else 1
+        stop = int(last) if last else n_frames if dash or not first else start
+    except ValueError:
+        start = stop = 0
+    if not 1 <= start <= stop <= LAST_FRAME:
+        raise ValueError(f"frames must be given as 7, 3-40 or 3-, from 1 on, got {text!r}")
+    return range(start, stop + 1)
+
+
+def frame_path(path: Path, frame: int, last: int) -> Path:
+    """``out.ply`` → ``out_0007.ply``, with as many digits as the last frame needs."""
+    return path.with_name(f"{path.stem}_{frame:0{max(4, len(str(last)))}d}{path.suffix}")
+
+
+def write_frames(
+    poser: FramePoser,
+    file: SplatFile,
+    frames: range,
+    path: Path,
+    *,
+    as_3dgs: bool = False,
+    progress: Progress = no_progress,
+) -> list[Path]:
+    """Write a PLY for each frame.
+
+    Parameters
+    ----------
+    poser : FramePoser
+    file : SplatFile
+        The file at rest.
+    frames : range
+    path : Path
+        ``frame_path`` makes the names of it.
+    as_3dgs : bool
+        Add a thin third scale to a file of two.
+    progress : callable
+        Asked several times a frame; what is written when it raises stays.
+
+    Returns
+    -------
+    list of Path
+    """
+    written = []
+    for done, kernels in _posed(poser, frames, progress):
+        frame = frames[done]
+        written.append(frame_path(path, frame, frames[-1]))
+        write_ply(written[-1], file, file.splats if kernels is None else adapted_splats(file.splats, kernels),
+                  as_3dgs=as_3dgs)  # fmt: skip
+        progress((done + 1) / len(frames))
+    return written
+
+
+def write_pictures(
+    poser: FramePoser,
+    frames: range,
+    path: Path,
+    draw: Callable[[AdaptedKernels | None], object],
+    write: Callable[[Path, object], None],
+    *,
+    progress: Progress = no_progress,
+) -> list[Path]:
+    """Draw and write a picture for each frame.
+
+    Parameters
+    ----------
+    poser, frames, path, progress
+        As of `write_frames`.
+    draw : callable
+        Makes pixels of kernels.
+    write : callable
+        ``write(path, pixels)``.
+    """
+    written = []
+    for done, kernels in _posed(poser, frames, progress):
+        written.append(frame_path(path, frames[done], frames[-1]))
+        write(written[-1], draw(kernels))
+        progress((done + 1) / len(frames))
+    return written
+
+
+def _posed(poser: FramePoser, frames: range, progress: Progress) -> Iterable[tuple[int, AdaptedKernels | None]]:
+    for done, frame in enumerate(frames):
+        start = done / len(frames)
+        yield (
+            done,
+            poser.kernels(frame, progress=lambda share, start=start: progress(start + 0.9 * share / len(frames))),
+        )

@@ -1,0 +1,94 @@
+"""Recipes on disk and edits in memory, each made from the other."""
+
+from dataclasses import asdict
+
+import numpy as np
+
+from splap_editor.core.graph.splat_graph import GraphOptions
+from splap_editor.core.handle_nodes import Region
+from splap_editor.core.splats.splats import Splats
+from splap_editor.engine.edit import HANDLE_COLORS, Edit, Handle, Pose
+from splap_editor.io.recipe import GraphSpec, HandleSpec, PinSpec, Recipe, RecipeError
+
+
+def recipe_of(edit: Edit, *, with_disabled: bool = False) -> Recipe:
+    """Write an edit as a recipe; disabled handles are left out unless wanted, since they do nothing."""
+    return Recipe(
+        method=edit.method,
+        graph=GraphSpec(**asdict(edit.graph)),
+        free_radius=edit.free_radius,
+        handles=tuple(_handle_spec(handle) for handle in (edit.handles if with_disabled else edit.active_handles)),
+        pins=tuple(PinSpec(*_place(pin)) for pin in edit.pins),
+        solver=edit.solver,
+        adaptation=edit.adaptation,
+        hops=edit.hops,
+        blending=edit.blending,
+    )
+
+
+def edit_of(recipe: Recipe, splats: Splats) -> Edit:
+    """Make an edit of a recipe.
+
+    The centre of a handle given by rows alone is the mean of its splats.
+
+    Raises
+    ------
+    RecipeError
+        A row is not in the file.
+    """
+    handles = tuple(
+        Handle(
+            number,
+            spec.name,
+            HANDLE_COLORS[(number - 1) % len(HANDLE_COLORS)],
+            _region(spec, splats, f"handle {spec.name!r}"),
+            Pose(spec.translate, spec.rotate, spec.scale),
+            cage_radius=spec.cage_radius,
+        )
+        for number, spec in enumerate(recipe.handles, start=1)
+    )
+    return Edit(
+        handles=handles,
+        pins=tuple(_region(spec, splats, f"pin {number}") for number, spec in enumerate(recipe.pins, start=1)),
+        method=recipe.method,
+        graph=GraphOptions(**asdict(recipe.graph)),
+        free_radius=recipe.free_radius,
+        solver=recipe.solver,
+        adaptation=recipe.adaptation,
+        hops=recipe.hops,
+        blending=recipe.blending,
+    )
+
+
+def _handle_spec(handle: Handle) -> HandleSpec:
+    center, radius, rows = _place(handle.region)
+    return HandleSpec(
+        handle.name,
+        center,
+        radius,
+        rows,
+        handle.pose.translate,
+        handle.pose.rotate,
+        handle.pose.scale,
+        handle.cage_radius,
+    )
+
+
+def _place(region: Region) -> tuple[tuple[float, ...], float | None, tuple[int, ...] | None]:
+    center = tuple(np.asarray(region.center, np.float64).tolist())
+    if region.rows is None:
+        return center, float(region.radius), None
+    return center, None, tuple(np.asarray(region.rows).tolist())
+
+
+def _region(spec: HandleSpec | PinSpec, splats: Splats, name: str) -> Region:
+    if spec.rows is None:
+        return Region(np.array(spec.center, np.float64), spec.radius)
+    rows = np.array(spec.rows, np.int64)
+    if rows.max(initial=-1) >= splats.n_splats:
+        raise RecipeError(
+            f"{name} names row {rows.max()}, but the file has rows 0 to {splats.n_splats - 1}: "
+            "the recipe was made for another file"
+        )
+    center = np.asarray(splats.means[rows], np.float64).mean(axis=0) if spec.center is None else np.array(spec.center)
+    return Region(center, 0.0, rows)

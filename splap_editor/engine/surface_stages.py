@@ -1,0 +1,147 @@
+"""The slow stages of a scene: made in full, loaded, or brought up to date after a mend."""
+
+from collections.abc import Iterable
+from contextlib import AbstractContextManager
+from dataclasses import replace
+from typing import NamedTuple, Protocol
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from splap_editor.core.graph.splat_graph import GraphOptions, SplatGraph, mended_graph, splat_graph
+from splap_editor.core.progress import Progress
+from splap_editor.core.splats.occupancy import Ellipses
+from splap_editor.core.surface.geodesics import Neighborhoods, geodesic_neighbors, mended_neighborhoods
+from splap_editor.core.surface.laplacian import point_cloud_laplacian
+from splap_editor.core.surface.local_triangulation import local_triangulations, mended_triangulations
+from splap_editor.engine.cache import Arrays
+from splap_editor.engine.parallel_lock import alone
+
+
+class Timed(Protocol):
+    """``with timed("graph"):`` keeps the block's seconds."""
+
+    def __call__(self, stage: str) -> AbstractContextManager:
+        """Begin a block."""
+        ...
+
+
+class StageProgress(Protocol):
+    """Gives the progress callback of a named stage."""
+
+    def __call__(self, stage: str) -> Progress:
+        """Begin a stage."""
+        ...
+
+
+class SurfaceStages(NamedTuple):
+    """Graph, and what is made from it.
+
+    Parameters
+    ----------
+    options : GraphOptions
+        What it was made with.
+    unmended : SplatGraph
+        The graph without cut or added edges.
+    graph : SplatGraph
+    neighborhoods : Neighborhoods
+    triangles : (T, 3) int32
+    L : (n, n) csr_array
+    M : (n,) float64
+    """
+
+    options: GraphOptions
+    unmended: SplatGraph
+    graph: SplatGraph
+    neighborhoods: Neighborhoods
+    triangles: NDArray[np.int32]
+    L: sp.csr_array
+    M: NDArray[np.float64]
+
+
+def unmended(options: GraphOptions) -> GraphOptions:
+    """Leave out the cut and added edges."""
+    return replace(options, cut=(), add=())
+
+
+def plain_stages(ellipses: Ellipses, options: GraphOptions, timed: Timed, stages: StageProgress) -> SurfaceStages:
+    """Make everything, without cut and added edges."""
+    options = unmended(options)
+    with timed("graph"), alone(stages("graph")):
+        graph = splat_graph(ellipses, options, progress=stages("graph"))
+    with timed("geodesics"), alone(stages("geodesics")):
+        neighborhoods = geodesic_neighbors(graph, options.k, progress=stages("geodesics"))
+    with timed("laplacian"):
+        triangles = local_triangulations(ellipses, neighborhoods, progress=stages("laplacian"))
+        L, M = point_cloud_laplacian(ellipses.centers, triangles, graph=graph)
+    return SurfaceStages(options, graph, graph, neighborhoods, triangles, L, M)
+
+
+def mended_stages(
+    ellipses: Ellipses, before: SurfaceStages, options: GraphOptions, timed: Timed, stages: StageProgress
+) -> SurfaceStages:
+    """Go on from stages that differ in cut and added edges only: to the bit what all stages would give.
+
+    The graph is not searched again, geodesics and stars only where a changed edge reaches.
+    """
+    with timed("mends"):
+        progress = stages("mends")
+        is_plain = not options.cut and not options.add
+        graph = before.unmended if is_plain else mended_graph(ellipses, before.unmended, options)
+        progress(0.2)
+        ends = _changed_ends(ellipses, before.options, options)
+        with alone(progress):
+            neighborhoods, nodes = mended_neighborhoods(graph, before.neighborhoods, ends, options.k)
+        triangles = mended_triangulations(ellipses, neighborhoods, before.triangles, nodes)
+        progress(0.5)
+    with timed("laplacian"):
+        L, M = point_cloud_laplacian(ellipses.centers, triangles, graph=graph)
+    return SurfaceStages(options, before.unmended, graph, neighborhoods, triangles, L, M)
+
+
+def _changed_ends(ellipses: Ellipses, before: GraphOptions, after: GraphOptions) -> NDArray[np.int64]:
+    """Nodes at the ends of the edges that only one of two options names."""
+    pairs = (_pairs(before.cut) ^ _pairs(after.cut)) | (_pairs(before.add) ^ _pairs(after.add))
+    return ellipses.node_of_row[np.array(sorted({row for pair in pairs for row in pair}), np.int64)]
+
+
+def _pairs(pairs: Iterable[tuple[int, int]]) -> set[tuple[int, int]]:
+    return {(min(pair), max(pair)) for pair in pairs}
+
+
+def packed_stages(made: SurfaceStages) -> Arrays:
+    """Arrays of unmended stages, for the cache."""
+    graph, neighborhoods, L = made.graph, made.neighborhoods, made.L
+    arrays = {
+        "graph_indptr": graph.indptr,
+        "graph_indices": graph.indices,
+        "graph_lengths": graph.lengths,
+        "graph_epsilon": np.array(graph.epsilon),
+        "near_indptr": neighborhoods.indptr,
+        "near_indices": neighborhoods.indices,
+        "near_distances": neighborhoods.distances,
+        "triangles": made.triangles,
+        "L_indptr": L.indptr,
+        "L_indices": L.indices,
+        "L_data": L.data,
+        "M": made.M,
+    }
+    if graph.touch is not None:
+        arrays["graph_touch"] = graph.touch
+    return arrays
+
+
+def unpacked_stages(kept: Arrays, options: GraphOptions) -> SurfaceStages:
+    """Unmended stages from the cache."""
+    graph = SplatGraph(
+        kept["graph_indptr"],
+        kept["graph_indices"],
+        kept["graph_lengths"],
+        kept.get("graph_touch"),
+        float(kept["graph_epsilon"]),
+    )
+    neighborhoods = Neighborhoods(kept["near_indptr"], kept["near_indices"], kept["near_distances"])
+    n = len(kept["M"])
+    L = sp.csr_array((kept["L_data"], kept["L_indices"], kept["L_indptr"]), shape=(n, n))
+    return SurfaceStages(unmended(options), graph, graph, neighborhoods, kept["triangles"], L, kept["M"])

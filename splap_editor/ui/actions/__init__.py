@@ -1,0 +1,1 @@
+"""What menus, keys and buttons call, as tables and the code behind them."""

@@ -1,0 +1,241 @@
+"""Opening, exporting, saving, and never losing an edit by it."""
+
+import os
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+
+from PySide6.QtCore import QSettings, QStandardPaths, Qt, QUrl
+from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import QFileDialog, QMessageBox, QWidget
+
+from splap_editor.engine.export_report import ExportReport
+from splap_editor.io.session_file import SUFFIX
+from splap_editor.resources import resource
+from splap_editor.session.bound_edit import column_lacks
+from splap_editor.session.documents import Documents
+from splap_editor.session.session import Session
+from splap_editor.ui.dialogs.export_dialog import ExportDialog
+from splap_editor.ui.widgets.toast import Toast
+
+OPEN_FILTER = "Splat PLY or session (*.ply *.splap);;All files (*)"
+EDIT_FILTER = "Edit (*.json);;All files (*)"
+SAMPLE = "windmill_2dgs.ply"
+
+
+class FileCommands:
+    """Everything that reads or writes a file.
+
+    Parameters
+    ----------
+    window : QWidget
+        Parent of the dialogs.
+    session : Session
+    documents : Documents
+    toast : Toast
+        Where results and refusals are said.
+    save_then : callable
+        ``save_then(then)`` saves the session and goes on once that is done.
+    """
+
+    def __init__(
+        self,
+        window: QWidget,
+        session: Session,
+        documents: Documents,
+        toast: Toast,
+        save_then: Callable[[Callable[[], None]], None],
+    ) -> None:
+        self._window = window
+        self._session = session
+        self._documents = documents
+        self._save_then = save_then
+        self._toast = toast
+        self._after_export: Callable[[], None] | None = None
+        session.exported.connect(self._on_exported)
+        session.failed.connect(self._on_failed)
+
+    # ---------------------------------------------------------------- open
+
+    def open(self) -> None:
+        """Ask for a PLY or a session and open it."""
+        self._ask_to_read("Open a splat PLY or a session", OPEN_FILTER, self.open_path)
+
+    def open_sample(self) -> None:
+        """Open the bundled sample."""
+        self.open_path(sample_path())
+
+    def open_path(self, path: Path) -> None:
+        """Open a PLY, a session or an edit, after asking about an edit that would be lost."""
+        if path.suffix.lower() == ".json":
+            self._read_edit(path)
+        elif path.suffix.lower() == SUFFIX:
+            self.leave_edit(lambda: self._documents.open(path))
+        else:
+            self.leave_edit(lambda: self._session.open(path))
+
+    def reread(self, layout: str | None) -> None:
+        """Read the open file again, as another layout; None recognises it. Asks about an edit that would be lost."""
+        path = self._session.scene.file.path
+        self.leave_edit(lambda: self._session.open(path, layout=layout))
+
+    def open_edit(self) -> None:
+        """Ask for a recipe and make it the edit."""
+        self._ask_to_read("Open an edit", EDIT_FILTER, self._read_edit)
+
+    def _read_edit(self, path: Path) -> None:
+        try:
+            self._session.open_edit(path)
+        except (OSError, ValueError, RuntimeError) as error:
+            self._toast.fail(f"{path.name} was not opened: {sentence(error)}")
+        else:
+            self._toast.say(f"Opened the edit {path.name}.")
+
+    # ---------------------------------------------------------------- write
+
+    def export(self) -> None:
+        """Ask where to, and write what is on screen."""
+        scene = self._session.scene
+        suggested = folder_to_write(scene.file.path) / f"{scene.file.path.stem}_edited.ply"
+        dialog = ExportDialog(self._window, suggested, scene, column_lacks(scene, self._session.bound))
+        dialog.accepted.connect(lambda: self._export(dialog))
+        dialog.rejected.connect(self._forget_after_export)
+        dialog.open()
+
+    def _export(self, dialog: ExportDialog) -> None:
+        QSettings().setValue("files/folder", str(dialog.path.parent))
+        self._session.export(dialog.path, as_3dgs=dialog.as_3dgs, columns=dialog.columns.names)
+
+    def save_edit(self) -> None:
+        """Ask where to, and write the edit as a recipe."""
+        source = self._session.scene.file.path
+        dialog = QFileDialog(self._window, "Save the edit", str(folder_to_write(source) / f"{source.stem}_edit.json"))
+        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
+        dialog.setNameFilter(EDIT_FILTER)
+        dialog.setDefaultSuffix("json")
+        self._open_dialog(dialog, self._write_edit)
+
+    def _write_edit(self, path: Path) -> None:
+        try:
+            self._session.save_edit(path)
+        except (OSError, ValueError) as error:
+            self._toast.fail(f"The edit was not saved: {sentence(error)}")
+        else:
+            self._toast.say(f"Saved the edit as {path.name}.")
+
+    def picture(self) -> None:
+        """Ask for a size, and write the view as a PNG."""
+        self._window.show_picture_dialog()
+
+    def quit(self) -> None:
+        """Close the window."""
+        self._window.close()
+
+    # ---------------------------------------------------------------- losing nothing
+
+    def leave_edit(self, then: Callable[[], None]) -> None:
+        """Go on at once, or after the person has saved, exported or let go of an edit that would be lost."""
+        if not self._documents.would_lose:
+            then()
+            return
+        scene = self._session.scene
+        box = QMessageBox(
+            QMessageBox.Icon.NoIcon,
+            "Save the edit?",
+            f"The edit of {scene.file.path.name} has not been saved.",
+            parent=self._window,
+        )
+        box.setInformativeText("It is lost when another file is opened or the window is closed.")
+        box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        save = box.addButton("Save" if self._documents.path else "Save…", QMessageBox.ButtonRole.AcceptRole)
+        export = box.addButton("Export PLY…", QMessageBox.ButtonRole.AcceptRole)
+        discard = box.addButton("Discard", QMessageBox.ButtonRole.DestructiveRole)
+        box.addButton("Cancel", QMessageBox.ButtonRole.RejectRole)
+        box.setDefaultButton(save)
+
+        def answered(button: object) -> None:
+            if button is save:
+                self._save_then(then)
+            elif button is export:
+                self._after_export = then
+                self.export()
+            elif button is discard:
+                then()
+
+        box.buttonClicked.connect(answered)
+        box.open()
+
+    def _forget_after_export(self) -> None:
+        self._after_export = None
+
+    # ---------------------------------------------------------------- results
+
+    def _on_exported(self, report: ExportReport) -> None:
+        folder = QUrl.fromLocalFile(str(report.path.parent))
+        self._toast.say(f"Exported {report}.", Show_folder=lambda: QDesktopServices.openUrl(folder))
+        if self._after_export is not None:
+            then, self._after_export = self._after_export, None
+            then()
+
+    def _on_failed(self, title: str, error: Exception) -> None:
+        self._after_export = None
+        buttons = {}
+        if self._session.state == "failed":
+            buttons["Try_again"] = self._session.resume
+        if not isinstance(error, (ValueError, OSError, MemoryError)):
+            buttons["Details"] = lambda: self._show_details(title, error)
+        self._toast.fail(f"{title} failed: {sentence(error)}", **buttons)
+
+    def _show_details(self, title: str, error: Exception) -> None:
+        box = QMessageBox(QMessageBox.Icon.NoIcon, title, f"{title} failed.", parent=self._window)
+        box.setInformativeText("This is a fault of the program. The text below helps to mend it.")
+        box.setDetailedText("".join(traceback.format_exception(error)))
+        box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        box.open()
+
+    # ---------------------------------------------------------------- dialogs
+
+    def _ask_to_read(self, title: str, name_filter: str, take: Callable[[Path], None]) -> None:
+        folder = QSettings().value("files/folder", _documents(), type=str)
+        dialog = QFileDialog(self._window, title, folder)
+        dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
+        dialog.setNameFilter(name_filter)
+        self._open_dialog(dialog, take)
+
+    def _open_dialog(self, dialog: QFileDialog, take: Callable[[Path], None]) -> None:
+        def chosen(name: str) -> None:
+            QSettings().setValue("files/folder", str(Path(name).parent))
+            take(Path(name))
+
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.fileSelected.connect(chosen)
+        dialog.open()
+
+
+def sample_path() -> Path:
+    """The capture that the program opens with."""
+    return resource("samples", SAMPLE)
+
+
+def sentence(error: BaseException) -> str:
+    """What went wrong, for a person."""
+    if isinstance(error, MemoryError):
+        return "there is not enough memory; close other programs or use a smaller file."
+    if isinstance(error, OSError) and error.strerror:
+        name = f" ({Path(error.filename).name})" if error.filename else ""
+        return f"{error.strerror.lower()}{name}."
+    text = str(error) or type(error).__name__
+    return text if text.endswith((".", "!", "?")) else f"{text}."
+
+
+def _documents() -> str:
+    return QStandardPaths.writableLocation(QStandardPaths.StandardLocation.DocumentsLocation)
+
+
+def folder_to_write(source: Path) -> Path:
+    """Folder to write to: the one used last, else the source's unless it is one of the program's own."""
+    used = QSettings().value("files/folder", "", type=str)
+    own = source.parent == sample_path().parent
+    folders = [Path(used)] if used else []
+    folders += [Path(_documents()), Path.home()] if own else [source.parent]
+    return next((folder for folder in folders if folder.is_dir() and os.access(folder, os.W_OK)), Path.home())

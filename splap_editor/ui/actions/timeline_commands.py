@@ -1,0 +1,165 @@
+"""What the Animation menu and the timeline strip do."""
+
+from bisect import bisect_left, bisect_right
+from dataclasses import replace
+from pathlib import Path
+
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtWidgets import QWidget
+
+from splap_editor.engine.edit import Edit
+from splap_editor.engine.keyframes import edit_at_frame, keyed_edit
+from splap_editor.engine.timeline import Timeline
+from splap_editor.session.session import Session
+from splap_editor.ui.actions.file_commands import sentence
+from splap_editor.ui.dialogs.frames_dialog import FramesDialog
+from splap_editor.ui.timeline.frame_export import FrameOrder, submit_frames
+from splap_editor.ui.timeline.player import Player
+from splap_editor.ui.widgets.toast import Toast
+from splap_editor.viewport.viewport import Viewport
+
+
+class TimelineCommands(QObject):
+    """Keys are undoable steps; going from frame to frame is none, as looking from elsewhere is none.
+
+    Parameters
+    ----------
+    window : QWidget
+        Parent of the dialog.
+    session : Session
+    viewport : Viewport
+    toast : Toast
+        Where results are said.
+    """
+
+    shown_changed = Signal(bool)
+
+    def __init__(self, window: QWidget, session: Session, viewport: Viewport, toast: Toast) -> None:
+        super().__init__(window)
+        self._window = window
+        self._session = session
+        self._viewport = viewport
+        self._toast = toast
+        self._is_shown = False
+        self.player = Player(session, viewport, self)
+        session.scene_changed.connect(self._on_scene_changed)
+
+    @property
+    def _edit(self) -> Edit:
+        return self._session.scene.edit
+
+    def show(self, on: bool) -> None:
+        """Show or hide the strip."""
+        if on != self._is_shown:
+            self._is_shown = on
+            self.shown_changed.emit(on)
+        if not on:
+            self.player.stop()
+
+    # ---------------------------------------------------------------- frames
+
+    def scrub(self, frame: int) -> None:
+        """Show a frame while the line is dragged."""
+        self.player.stop()
+        self._session.scene.set_preview(edit_at_frame(self._edit, frame))
+
+    def go_to(self, frame: int) -> None:
+        """Show a frame, and stay there."""
+        self.player.stop()
+        scene = self._session.scene
+        if frame != scene.edit.timeline.frame or scene.preview is not None:
+            scene.set_edit(edit_at_frame(scene.edit, frame))
+
+    def next_frame(self) -> None:
+        """Go one frame on."""
+        timeline = self._edit.timeline
+        self.go_to(min(timeline.frame + 1, max(timeline.n_frames, timeline.frame)))
+
+    def previous_frame(self) -> None:
+        """Go one frame back."""
+        self.go_to(max(self._edit.timeline.frame - 1, 1))
+
+    def next_key(self) -> None:
+        """Go to the next key."""
+        timeline = self._edit.timeline
+        later = timeline.key_frames[bisect_right(timeline.key_frames, timeline.frame) :]
+        self.go_to(later[0] if later else timeline.frame)
+
+    def previous_key(self) -> None:
+        """Go to the key before."""
+        timeline = self._edit.timeline
+        earlier = timeline.key_frames[: bisect_left(timeline.key_frames, timeline.frame)]
+        self.go_to(earlier[-1] if earlier else timeline.frame)
+
+    def play(self, on: bool) -> None:
+        """Play, or stop."""
+        if on:
+            self.player.play()
+        else:
+            self.player.stop()
+
+    # ---------------------------------------------------------------- keys
+
+    def set_key(self) -> None:
+        """Keep the poses of all handles at the frame shown."""
+        self.player.stop()
+        self._session.change_edit(keyed_edit(self._edit), "Set key")
+
+    def delete_key(self) -> None:
+        """Delete the key at the frame shown."""
+        self.delete_key_at(self._edit.timeline.frame)
+
+    def delete_key_at(self, frame: int) -> None:
+        """Delete the key of a frame."""
+        self._change(self._edit.timeline.without_key(frame), "Delete key")
+
+    def move_key(self, frame: int, to: int) -> None:
+        """Move a key to another frame."""
+        self._change(self._edit.timeline.with_key_moved(frame, to), "Move key")
+
+    def change(self, label: str, **values: object) -> None:
+        """Change length, speed or interpolation."""
+        timeline = replace(self._edit.timeline, **values)
+        if timeline != self._edit.timeline:
+            self._change(timeline, label)
+
+    def smooth(self, on: bool) -> None:
+        """Move smoothly through the keys, or straight from one to the next."""
+        self.change("Change interpolation", is_smooth=on)
+
+    def auto_key(self, on: bool) -> None:
+        """Set a key whenever a handle is posed."""
+        self.change("Change automatic keys", is_auto=on)
+
+    def export(self) -> None:
+        """Ask for a range, and write frames or pictures."""
+        self.player.stop()
+        scene, projection = self._session.scene, self._viewport.projection
+        size = projection.width, projection.height
+        FramesDialog(self._window, scene.file.path, scene.edit.timeline, size, self.export_frames).open()
+
+    def export_frames(self, order: FrameOrder) -> None:
+        """Write frames in the background."""
+
+        def done(written: list[Path]) -> None:
+            n = len(written)
+            self._toast.say(f"Exported {n} frames, {written[0].name} and so on." if n > 1 else "Exported 1 frame.")
+
+        def failed(error: Exception) -> None:
+            self._toast.fail(f"The frames were not exported: {sentence(error)}")
+
+        submit_frames(self._session, self._viewport, order, done, failed)
+
+    def _change(self, timeline: Timeline, label: str) -> None:
+        """Take a changed timeline, and show the frame as it is now."""
+        self.player.stop()
+        edit = replace(self._edit, timeline=timeline)
+        self._session.change_edit(edit_at_frame(edit, timeline.frame) if timeline.keys else edit, label)
+
+    def _on_scene_changed(self) -> None:
+        self._session.scene.edit_changed.connect(self._show_if_keyed)
+        self._show_if_keyed()
+
+    def _show_if_keyed(self) -> None:
+        if self._edit.timeline.keys and not self._is_shown:
+            self.show(True)

@@ -1,0 +1,79 @@
+"""The help sheet: every key and gesture on one page."""
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QDialog, QGridLayout, QHBoxLayout, QLabel, QScrollArea, QVBoxLayout, QWidget
+
+from splap_editor.ui.actions.action_table import ACTIONS, MENUS
+from splap_editor.ui.actions.actions import shown_keys
+from splap_editor.ui.gestures import GESTURES
+from splap_editor.ui.theme import STEP
+
+COLUMN_PX = 400
+
+
+class HelpSheet(QDialog):
+    """Made from the action table and the gesture table; F1 or Escape closes it."""
+
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Keys and gestures")
+        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        blocks = [(title, list(rows)) for title, rows in GESTURES.items()]
+        blocks += [(menu.replace("&", ""), _action_rows(menu)) for menu in MENUS]
+        blocks = [block for block in blocks if block[1]]
+        page = QWidget()
+        columns = QHBoxLayout(page)
+        columns.setContentsMargins(6 * STEP, 5 * STEP, 6 * STEP, 6 * STEP)
+        columns.setSpacing(10 * STEP)
+        for column in _in_columns(blocks, min(max(parent.width() // COLUMN_PX, 1), 3)):
+            stack = QVBoxLayout()
+            stack.setSpacing(5 * STEP)
+            for title, rows in column:
+                stack.addLayout(_block(title, rows))
+            stack.addStretch(1)
+            columns.addLayout(stack)
+        scroll = QScrollArea(widgetResizable=True)
+        scroll.setWidget(page)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(scroll)
+        room = parent.size()
+        wanted = page.sizeHint()
+        self.resize(min(wanted.width() + 16, room.width() - 32), min(wanted.height() + 4, room.height() - 32))
+
+
+def _action_rows(menu: str) -> list[tuple[str, str]]:
+    return [
+        (" or ".join(shown_keys(keys) for keys in spec.shortcuts[:2]), spec.label)
+        for spec in ACTIONS
+        if spec.menu.split("/")[0] == menu and spec.shortcuts
+    ]
+
+
+def _in_columns(blocks: list, n_columns: int) -> list[list]:
+    """Share blocks out in order, columns about equally tall."""
+    total = sum(len(rows) + 2 for _, rows in blocks)
+    columns: list[list] = [[]]
+    filled = 0
+    for block in blocks:
+        if columns[-1] and filled >= total * len(columns) / n_columns:
+            columns.append([])
+        columns[-1].append(block)
+        filled += len(block[1]) + 2
+    return columns
+
+
+def _block(title: str, rows: list[tuple[str, str]]) -> QGridLayout:
+    grid = QGridLayout()
+    grid.setHorizontalSpacing(4 * STEP)
+    grid.setVerticalSpacing(STEP)
+    grid.setColumnStretch(1, 1)
+    head = QLabel(title)
+    head.setProperty("tone", "title")
+    grid.addWidget(head, 0, 0, 1, 2)
+    for row, (keys, what) in enumerate(rows, start=1):
+        cap = QLabel(keys)
+        cap.setObjectName("keyCap")
+        grid.addWidget(cap, row, 0, Qt.AlignmentFlag.AlignLeft)
+        grid.addWidget(QLabel(what), row, 1)
+    return grid

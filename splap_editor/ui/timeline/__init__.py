@@ -1,0 +1,1 @@
+"""The timeline strip, playing, and frames as files."""

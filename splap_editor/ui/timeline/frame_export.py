@@ -1,0 +1,161 @@
+"""Frames as files: posed on the worker, drawn on the main thread between its events."""
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
+from splap_editor.engine.edit import binds_like
+from splap_editor.engine.frames import FramePoser, frame_path, frame_poser, write_frames, write_pictures
+from splap_editor.io.png import write_png
+from splap_editor.session.jobs import Job
+from splap_editor.session.session import Session
+from splap_editor.viewport.camera import View
+from splap_editor.viewport.studio import Studio, turntable_views
+from splap_editor.viewport.viewport import Viewport
+
+POLL_S = 0.05
+
+
+@dataclass(frozen=True)
+class FrameOrder:
+    """What to export.
+
+    Parameters
+    ----------
+    kind : str
+        ``"ply"``, ``"pictures"`` or ``"turntable"``.
+    frames : range
+        Frames of the timeline; of a turntable, 1 to the number of pictures.
+    path : Path
+        The frames are named after it.
+    size : (int, int)
+        Of pictures, in pixels.
+    is_transparent : bool
+        Pictures without a background.
+    as_3dgs : bool
+        PLYs with a third scale.
+    """
+
+    kind: str
+    frames: range
+    path: Path
+    size: tuple[int, int] = (1280, 720)
+    is_transparent: bool = False
+    as_3dgs: bool = False
+
+
+def submit_frames(
+    session: Session,
+    viewport: Viewport,
+    order: FrameOrder,
+    done: Callable[[list[Path]], None],
+    failed: Callable[[Exception], None],
+) -> Job:
+    """Queue the export of frames as they are now; cancelling keeps the files that are whole.
+
+    Parameters
+    ----------
+    session : Session
+        With a scene, whose surface is made where a handle is enabled.
+    viewport : Viewport
+        Its camera, look and background are those of the pictures.
+    order : FrameOrder
+    done : callable
+        Given the written files.
+    failed : callable
+        Given what went wrong.
+    """
+    scene, bound = session.scene, session.bound
+    file, edit, surface, cache = scene.file, scene.edit, scene.surface, session.cache
+    deformer = bound.deformer if bound is not None and binds_like(bound.edit, edit) else None
+    desk = _Desk(scene.splats, viewport, order, scene.hidden) if order.kind != "ply" else None
+
+    def poser(job: Job) -> FramePoser:
+        if deformer is not None and edit.active_handles:
+            return FramePoser(surface, edit, deformer)
+        return frame_poser(surface, edit, cache=cache, progress=job.progress("binding"))
+
+    def work(job: Job) -> list[Path]:
+        frames, path = order.frames, order.path
+        poses = poser(job)
+        progress = job.progress("frames")
+        if order.kind == "ply":
+            return write_frames(poses, file, frames, path, as_3dgs=order.as_3dgs, progress=progress)
+        if order.kind == "pictures":
+            return write_pictures(poses, frames, path, lambda k: desk.picture(job, k), write_png, progress=progress)
+        kernels = poses.kernels(None)
+        written = []
+        for number, view in enumerate(turntable_views(desk.view, len(frames), desk.world_up), start=1):
+            written.append(frame_path(path, number, len(frames)))
+            write_png(written[-1], desk.picture(job, kernels, view))
+            progress(number / len(frames))
+        return written
+
+    def ended(call: Callable[[], None]) -> None:
+        if desk is not None:
+            desk.close()
+        call()
+
+    title = {"ply": "Exporting frames", "pictures": "Drawing frames", "turntable": "Drawing a turntable"}[order.kind]
+    return session.worker.submit(
+        Job(
+            "frames",
+            title,
+            work,
+            done=lambda written: ended(lambda: done(written)),
+            failed=lambda error: ended(lambda: failed(error)),
+            stopped=lambda: ended(lambda: None),
+        )
+    )
+
+
+class _Desk:
+    """A studio of the main thread, asked for pictures by the worker."""
+
+    def __init__(self, splats, viewport: Viewport, order: FrameOrder, hidden: NDArray[np.bool_]) -> None:
+        self.view = viewport.camera.view
+        self.world_up = np.array(viewport.camera.world_up)
+        self._is_transparent = order.is_transparent
+        self._splats, self._hidden, self._size = splats, hidden, order.size
+        self._look = viewport.splats.look
+        shown = viewport.renderer
+        bottom = shown.GetBackground()
+        self._background = bottom, shown.GetBackground2() if shown.GetGradientBackground() else bottom
+        self._studio: Studio | None = None
+
+    def picture(self, job: Job, kernels: AdaptedKernels | None, view: View | None = None) -> NDArray[np.uint8]:
+        """Pixels of kernels; waits for the main thread, and no longer than until the job is cancelled."""
+        is_drawn = threading.Event()
+        result: list[object] = []
+
+        def draw() -> None:
+            try:
+                result.append(self._draw(kernels, view or self.view))
+            except (ValueError, MemoryError) as error:
+                result.append(error)
+            is_drawn.set()
+
+        job.deliver(draw)
+        while not is_drawn.wait(POLL_S):
+            job.report(job.share)
+        if isinstance(result[0], Exception):
+            raise result[0]
+        return result[0]
+
+    def close(self) -> None:
+        """Let go of the graphics; on the main thread."""
+        if self._studio is not None:
+            self._studio.close()
+            self._studio = None
+
+    def _draw(self, kernels: AdaptedKernels | None, view: View) -> NDArray[np.uint8]:
+        if self._studio is None:
+            self._studio = Studio(self._splats, self._look, *self._size, hidden=self._hidden)
+            self._studio.viewport.set_background(*self._background)
+        self._studio.pose(kernels)
+        return self._studio.picture(view, is_transparent=self._is_transparent)

@@ -1,0 +1,84 @@
+"""The strip under the picture: play, keys, frames."""
+
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QWidget
+
+from splap_editor.engine.timeline import LAST_FRAME
+from splap_editor.session.session import Session
+from splap_editor.ui.actions.actions import ActionSet
+from splap_editor.ui.actions.timeline_commands import TimelineCommands
+from splap_editor.ui.theme import STEP
+from splap_editor.ui.timeline.ruler import TimelineRuler
+from splap_editor.ui.widgets.number_field import NumberField
+
+
+class TimelineStrip(QWidget):
+    """Shows the timeline of the edit on screen; hidden until it is asked for or a key is set.
+
+    Parameters
+    ----------
+    session : Session
+    commands : TimelineCommands
+        Carry out what is done here.
+    actions : ActionSet
+    """
+
+    def __init__(
+        self, session: Session, commands: TimelineCommands, actions: ActionSet, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self.setObjectName("headerBar")
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        self._session = session
+        self._actions = actions
+        self.ruler = TimelineRuler()
+        self.frame_field = _field("Frame shown", 1, LAST_FRAME)
+        self.length_field = _field("Number of frames", 1, LAST_FRAME)
+        self.fps_field = _field("Frames per second", 1, 240)
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(2 * STEP, STEP, 2 * STEP, STEP)
+        layout.setSpacing(STEP)
+        for action_id in ("timeline.play", "timeline.set_key"):
+            button = QToolButton()
+            button.setDefaultAction(actions[action_id])
+            button.setIconSize(QSize(18, 18))
+            layout.addWidget(button)
+        layout.addWidget(self.frame_field)
+        layout.addWidget(self.ruler, 1)
+        layout.addWidget(self.length_field)
+        layout.addWidget(QLabel("at"))
+        layout.addWidget(self.fps_field)
+        layout.addWidget(QLabel("fps"))
+        self.ruler.scrubbed.connect(commands.scrub)
+        self.ruler.chosen.connect(commands.go_to)
+        self.ruler.key_moved.connect(commands.move_key)
+        self.ruler.key_deleted.connect(commands.delete_key_at)
+        self.frame_field.committed.connect(lambda frame: commands.go_to(int(frame)))
+        self.length_field.committed.connect(lambda n: commands.change("Change length", n_frames=int(n)))
+        self.fps_field.committed.connect(lambda fps: commands.change("Change speed", fps=float(fps)))
+        commands.shown_changed.connect(self.setVisible)
+        commands.player.playing_changed.connect(lambda on: actions.check("timeline.play", on))
+        session.scene_changed.connect(self._on_scene_changed)
+        self.hide()
+
+    def _on_scene_changed(self) -> None:
+        scene = self._session.scene
+        scene.edit_changed.connect(self._show)
+        scene.preview_changed.connect(self._show)
+        self._show()
+
+    def _show(self) -> None:
+        timeline = self._session.scene.shown_edit.timeline
+        self.ruler.show_timeline(timeline)
+        self.frame_field.show_value(timeline.frame)
+        self.length_field.show_value(timeline.n_frames)
+        self.fps_field.show_value(timeline.fps)
+        self._actions.check("timeline.smooth", timeline.is_smooth)
+        self._actions.check("timeline.auto_key", timeline.is_auto)
+
+
+def _field(tip: str, low: float, high: float) -> NumberField:
+    field = NumberField(low, high, decimals=0 if low == high or high > 1000 else 2, step=1)
+    field.setToolTip(tip)
+    field.setFixedWidth(56)
+    return field

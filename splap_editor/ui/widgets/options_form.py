@@ -1,0 +1,132 @@
+"""A form made from the fields of a dataclass."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QCheckBox, QComboBox, QGridLayout, QLabel, QWidget
+
+from splap_editor.ui.theme import STEP
+from splap_editor.ui.widgets.number_field import NumberField
+
+LABEL_PX = 84
+"""All labels in front of fields are as wide, so that fields of several forms line up."""
+
+
+@dataclass(frozen=True)
+class FieldHint:
+    """How one field is shown.
+
+    Parameters
+    ----------
+    label, tip, unit : str
+    low, high, step : float
+        Range and step of a number.
+    decimals : int
+        Digits after the point of a float.
+    choices : dict
+        Values of a choice with the words for them; empty for numbers and switches.
+    only_for : (str, tuple), optional
+        Name and values of another field without which this one means nothing.
+    """
+
+    label: str
+    tip: str = ""
+    unit: str = ""
+    low: float = 0.0
+    high: float = 1e9
+    step: float = 1.0
+    decimals: int = 3
+    choices: Mapping[Any, str] | None = None
+    only_for: tuple[str, tuple] | None = None
+
+
+class OptionsForm(QWidget):
+    """Edits a frozen dataclass; each finished entry gives a new value.
+
+    Fields come in their order in the class; one without a hint is not shown.
+    """
+
+    changed = Signal(object)
+
+    def __init__(self, value: Any, hints: Mapping[str, FieldHint], parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._value = value
+        self._hints = {field.name: hints[field.name] for field in fields(value) if field.name in hints}
+        self._editors: dict[str, QWidget] = {}
+        self._labels: dict[str, QLabel] = {}
+        grid = QGridLayout(self)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setHorizontalSpacing(2 * STEP)
+        grid.setVerticalSpacing(STEP)
+        grid.setColumnStretch(1, 1)
+        for row, (name, hint) in enumerate(self._hints.items()):
+            editor = self._editor(name, hint, getattr(value, name))
+            editor.setObjectName(name)
+            editor.setToolTip(hint.tip)
+            if isinstance(editor, QCheckBox):
+                grid.addWidget(editor, row, 0, 1, 2)
+            else:
+                label = form_label(hint.label, editor)
+                self._labels[name] = label
+                grid.addWidget(label, row, 0)
+                grid.addWidget(editor, row, 1)
+            self._editors[name] = editor
+        self.show_value(value)
+
+    def show_value(self, value: Any) -> None:
+        """Show a value without telling anyone."""
+        self._value = value
+        for name, editor in self._editors.items():
+            held = getattr(value, name)
+            editor.blockSignals(True)
+            if isinstance(editor, QCheckBox):
+                editor.setChecked(held)
+            elif isinstance(editor, QComboBox):
+                editor.setCurrentIndex(max(editor.findData(held), 0))
+            else:
+                editor.show_value(held)
+            editor.blockSignals(False)
+            only_for = self._hints[name].only_for
+            is_meant = only_for is None or getattr(value, only_for[0]) in only_for[1]
+            self.show_field(name, is_meant)
+
+    def show_field(self, name: str, is_shown: bool) -> None:
+        """Show or hide one field with its label."""
+        self._editors[name].setVisible(is_shown)
+        if name in self._labels:
+            self._labels[name].setVisible(is_shown)
+
+    def _editor(self, name: str, hint: FieldHint, value: Any) -> QWidget:
+        if hint.choices:
+            editor = QComboBox()
+            for choice, words in hint.choices.items():
+                editor.addItem(words, choice)
+            editor.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+            editor.currentIndexChanged.connect(lambda index: self._take(name, editor.itemData(index)))
+        elif isinstance(value, bool):
+            editor = QCheckBox(hint.label)
+            editor.toggled.connect(lambda checked: self._take(name, checked))
+        else:
+            kind = type(value)
+            decimals = 0 if kind is int else hint.decimals
+            editor = NumberField(hint.low, hint.high, decimals=decimals, step=hint.step, unit=hint.unit)
+            editor.committed.connect(lambda number: self._take(name, kind(number)))
+        return editor
+
+    def _take(self, name: str, held: Any) -> None:
+        if getattr(self._value, name) != held:
+            self.show_value(replace(self._value, **{name: held}))
+            self.changed.emit(self._value)
+
+
+def form_label(text: str, buddy: QWidget) -> QLabel:
+    """Quiet label in front of a field."""
+    label = QLabel(text)
+    label.setProperty("tone", "quiet")
+    label.setBuddy(buddy)
+    label.setMinimumWidth(LABEL_PX)
+    label.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+    label.setToolTip(buddy.toolTip())
+    return label

@@ -1,0 +1,78 @@
+"""Laws of poses and edits."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from splap_editor.core.handle_nodes import Region
+from splap_editor.core.splats.rotations import quats_to_matrices
+from splap_editor.engine.edit import Edit, Handle, Pose, binds_like, poses_like
+from splap_editor.io.recipe import SolverSpec
+
+
+def similarity(rng):
+    quat = rng.normal(size=4)
+    quat /= np.linalg.norm(quat)
+    transform = np.eye(4)
+    transform[:3, :3] = rng.uniform(0.5, 2.0) * quats_to_matrices(quat[None])[0]
+    transform[:3, 3] = rng.normal(size=3)
+    return transform
+
+
+def handle(handle_id=1, center=(1.0, 2.0, 3.0), pose=None):
+    return Handle(handle_id, "h", "#ffffff", Region(np.array(center), 0.1), pose or Pose())
+
+
+def test_the_rest_pose_moves_nothing():
+    np.testing.assert_array_equal(Pose().matrix(np.array([1.0, 2.0, 3.0])), np.eye(4))
+    assert Pose().is_identity
+
+
+def test_moving_a_pose_composes_world_transforms():
+    rng = np.random.default_rng(1)
+    center = rng.normal(size=3)
+    pose = Pose()
+    expected = np.eye(4)
+    for _ in range(5):
+        delta = similarity(rng)
+        pose = pose.moved(delta, center)
+        expected = delta @ expected
+        np.testing.assert_allclose(pose.matrix(center), expected, atol=1e-12 * np.abs(expected).max())
+
+
+def test_an_edit_never_changes():
+    edit = Edit().with_handle(handle())
+    posed = edit.with_poses({1: Pose((1.0, 0.0, 0.0))})
+    assert edit.is_identity and not posed.is_identity
+    assert posed.handle(1).region is edit.handle(1).region
+    assert posed.without_handles([1]).handles == ()
+    assert edit.next_handle_id() == 2
+
+
+def test_a_pose_change_needs_no_new_binding():
+    edit = Edit().with_handle(handle())
+    posed = edit.with_poses({1: Pose((1.0, 0.0, 0.0))})
+    assert binds_like(edit, posed) and not poses_like(edit, posed)
+    assert not binds_like(edit, edit.with_handle(handle(2)))
+
+
+def test_a_disabled_handle_neither_binds_nor_poses():
+    edit = Edit().with_handle(handle())
+    both = edit.with_handle(replace(handle(2, pose=Pose((5.0, 0.0, 0.0))), enabled=False))
+    assert binds_like(edit, both) and poses_like(edit, both)
+    assert both.transforms.shape == (1, 4, 4)
+
+
+def test_only_what_the_method_uses_asks_for_a_new_binding():
+    arap = Edit().with_handle(handle())
+    bbw = replace(arap, method="bbw")
+    for field, value, needed_by in (
+        ("free_radius", 2.0, "arap"),
+        ("solver", SolverSpec(iterations=3), "arap"),
+        ("blending", "linear", "bbw"),
+    ):
+        assert binds_like(arap, replace(arap, **{field: value})) == (needed_by != "arap"), field
+        assert binds_like(bbw, replace(bbw, **{field: value})) == (needed_by != "bbw"), field
+    wider = replace(arap.handles[0], cage_radius=None)
+    assert binds_like(arap, arap.with_handle(wider))
+    assert not binds_like(bbw, bbw.with_handle(wider))
