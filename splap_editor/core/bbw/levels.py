@@ -7,6 +7,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from splap_editor.core.surface.shortest_paths import settle
+
 
 @dataclass(frozen=True, eq=False)
 class Level:
@@ -120,64 +122,16 @@ def _cell_centers(indptr, indices, lengths, kept, radius):
     n = indptr.size - 1
     owner = np.full(n, -1, np.int64)
     nearest = np.full(n, np.inf)
-    tentative = np.full(n, np.inf)
-    touched = np.empty(n, np.int64)
-    heap_keys = np.empty(indices.size + 1)
-    heap_nodes = np.empty(indices.size + 1, np.int64)
+    keys, items = np.empty(1024), np.empty(1024, np.int64)
+    near, far = np.empty(n, np.int64), np.empty(n)
     for sweep in range(2):
         for center in range(n):
             if (sweep == 0 and not kept[center]) or (sweep == 1 and nearest[center] <= radius):
                 continue
-            # Dijkstra from this centre, stopped at the radius and wherever another centre is nearer.
-            tentative[center] = 0.0
-            touched[0] = center
-            n_touched = 1
-            heap_keys[0] = 0.0
-            heap_nodes[0] = center
-            size = 1
-            while size > 0:
-                distance = heap_keys[0]
-                node = heap_nodes[0]
-                size -= 1
-                key = heap_keys[size]
-                moved = heap_nodes[size]
-                hole = 0
-                while True:
-                    child = 2 * hole + 1
-                    if child >= size:
-                        break
-                    if child + 1 < size and heap_keys[child + 1] < heap_keys[child]:
-                        child += 1
-                    if heap_keys[child] >= key:
-                        break
-                    heap_keys[hole] = heap_keys[child]
-                    heap_nodes[hole] = heap_nodes[child]
-                    hole = child
-                heap_keys[hole] = key
-                heap_nodes[hole] = moved
-                if distance > tentative[node] or distance >= nearest[node]:
-                    continue
-                nearest[node] = distance
-                owner[node] = center
-                for q in range(indptr[node], indptr[node + 1]):
-                    other = indices[q]
-                    reached = distance + lengths[q]
-                    if reached <= radius and reached < tentative[other] and reached < nearest[other]:
-                        if tentative[other] == np.inf:
-                            touched[n_touched] = other
-                            n_touched += 1
-                        tentative[other] = reached
-                        hole = size
-                        size += 1
-                        while hole > 0:
-                            parent = (hole - 1) // 2
-                            if heap_keys[parent] <= reached:
-                                break
-                            heap_keys[hole] = heap_keys[parent]
-                            heap_nodes[hole] = heap_nodes[parent]
-                            hole = parent
-                        heap_keys[hole] = reached
-                        heap_nodes[hole] = other
-            for q in range(n_touched):
-                tentative[touched[q]] = np.inf
+            nearest[center] = 0.0
+            keys[0], items[0] = 0.0, center
+            # It ends at the radius, and wherever another centre is no farther.
+            n_won, keys, items = settle(indptr, indices, lengths, radius, nearest, keys, items, 1, near, far)
+            for i in range(n_won):
+                owner[near[i]] = center
     return owner

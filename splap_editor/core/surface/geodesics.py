@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from splap_editor.core.graph.splat_graph import SplatGraph
 from splap_editor.core.progress import Progress, no_progress
+from splap_editor.core.surface.shortest_paths import heap_add, settle
 
 _CHUNK = 16384
 _BLOCK = 512
@@ -73,12 +74,14 @@ def geodesic_neighbors(
     indices, distances = [np.empty(0, np.int32)], [np.empty(0)]
     for start in range(0, len(sources), _CHUNK):
         chunk = sources[start : start + _CHUNK]
-        near, far = np.empty((len(chunk), k), np.int32), np.empty((len(chunk), k))
-        counts.append(np.zeros(len(chunk), np.int32))
-        _nearest(chunk, graph.indptr, graph.indices, graph.lengths, tentative, near, far, counts[-1])
+        # A search settles its own node first.
+        near, far = np.empty((len(chunk), k + 1), np.int32), np.empty((len(chunk), k + 1))
+        settled = np.zeros(len(chunk), np.int32)
+        _nearest(chunk, graph.indptr, graph.indices, graph.lengths, tentative, near, far, settled)
+        counts.append(settled - 1)
         found = np.arange(k) < counts[-1][:, None]
-        indices.append(near[found])
-        distances.append(far[found])
+        indices.append(near[:, 1:][found])
+        distances.append(far[:, 1:][found])
         progress((start + len(chunk)) / len(sources))
     indptr = np.concatenate([[0], np.cumsum(np.concatenate(counts))]).astype(np.int32)
     return Neighborhoods(indptr, np.concatenate(indices), np.concatenate(distances))
@@ -180,94 +183,30 @@ def geodesic_distances(
     return _spread(sources, graph.indptr, graph.indices, graph.lengths, float(limit))
 
 
-@nb.njit(nogil=True, cache=True)
-def _push(heap_keys, heap_nodes, size, key, node):
-    """Put an entry into a binary heap ordered by key, then node; returns its arrays, longer ones if they were full."""
-    if size == len(heap_keys):
-        keys, nodes = np.empty(2 * size), np.empty(2 * size, np.int32)
-        for i in range(size):
-            keys[i], nodes[i] = heap_keys[i], heap_nodes[i]
-        heap_keys, heap_nodes = keys, nodes
-    i = size
-    while i > 0:
-        up = (i - 1) >> 1
-        if heap_keys[up] < key or (heap_keys[up] == key and heap_nodes[up] <= node):
-            break
-        heap_keys[i], heap_nodes[i] = heap_keys[up], heap_nodes[up]
-        i = up
-    heap_keys[i], heap_nodes[i] = key, node
-    return heap_keys, heap_nodes
-
-
-@nb.njit(nogil=True, cache=True)
-def _drop_first(heap_keys, heap_nodes, size):
-    """Take the least entry out of a heap that holds ``size`` more."""
-    key, node = heap_keys[size], heap_nodes[size]
-    i = 0
-    while True:
-        down = 2 * i + 1
-        if down >= size:
-            break
-        if down + 1 < size and (
-            heap_keys[down + 1] < heap_keys[down]
-            or (heap_keys[down + 1] == heap_keys[down] and heap_nodes[down + 1] < heap_nodes[down])
-        ):
-            down += 1
-        if heap_keys[down] > key or (heap_keys[down] == key and heap_nodes[down] >= node):
-            break
-        heap_keys[i], heap_nodes[i] = heap_keys[down], heap_nodes[down]
-        i = down
-    heap_keys[i], heap_nodes[i] = key, node
-
-
 @nb.njit(nogil=True, cache=True, parallel=True)
 def _nearest(sources, indptr, indices, lengths, tentative, near, far, counts):
-    """Truncated Dijkstra from each of some nodes: rows of the k nearest and how many there are.
+    """Truncated Dijkstra from each of some nodes: rows of itself and the k nearest, and how many that is.
 
     ``tentative`` has a row per thread that is inf everywhere, before and after. In Morton order the part of it one
     search touches stays in the processor's cache, which makes a plain array faster than a hash table.
     """
     for block in nb.prange((len(near) + _BLOCK - 1) // _BLOCK):
         best = tentative[nb.get_thread_id()]
-        heap_keys, heap_nodes = np.empty(1024), np.empty(1024, np.int32)
+        keys, items = np.empty(1024), np.empty(1024, np.int32)
         for row in range(block * _BLOCK, min((block + 1) * _BLOCK, len(near))):
-            heap_keys, heap_nodes = _search(
-                sources[row], indptr, indices, lengths, best, heap_keys, heap_nodes, near[row], far[row], counts[row:]
+            best[sources[row]] = 0.0
+            keys[0], items[0] = 0.0, sources[row]
+            counts[row], keys, items = settle(
+                indptr, indices, lengths, np.inf, best, keys, items, 1, near[row], far[row]
             )
-
-
-@nb.njit(nogil=True, cache=True)
-def _search(source, indptr, indices, lengths, tentative, heap_keys, heap_nodes, near, far, count):
-    """One truncated Dijkstra; returns the heap's arrays, which may have grown."""
-    tentative[source] = 0.0
-    heap_keys[0], heap_nodes[0], size, found = 0.0, source, 1, -1
-    while size > 0:
-        distance, node = heap_keys[0], heap_nodes[0]
-        size -= 1
-        _drop_first(heap_keys, heap_nodes, size)
-        if distance > tentative[node]:
-            continue
-        if found >= 0:
-            near[found], far[found] = node, distance
-        found += 1
-        if found == len(near):
-            break
-        for e in range(indptr[node], indptr[node + 1]):
-            other, reached = indices[e], distance + lengths[e]
-            if reached < tentative[other]:
-                tentative[other] = reached
-                heap_keys, heap_nodes = _push(heap_keys, heap_nodes, size, reached, other)
-                size += 1
-    count[0] = found
-    # What the search touched is the source, what it settled, and the neighbours of all but the last of these.
-    _forget(source, indptr, indices, tentative)
-    for i in range(found):
-        _forget(near[i], indptr, indices, tentative)
-    return heap_keys, heap_nodes
+            # What the search touched is what it settled and neighbours of that.
+            for i in range(counts[row]):
+                _forget(near[row, i], indptr, indices, best)
 
 
 @nb.njit(nogil=True, cache=True)
 def _forget(node, indptr, indices, tentative):
+    """Take back what a search that settled a node wrote there and next to it."""
     tentative[node] = np.inf
     for e in range(indptr[node], indptr[node + 1]):
         tentative[indices[e]] = np.inf
@@ -275,24 +214,14 @@ def _forget(node, indptr, indices, tentative):
 
 @nb.njit(nogil=True, cache=True)
 def _spread(sources, indptr, indices, lengths, limit):
-    """Dijkstra from several sources at once."""
-    tentative = np.full(len(indptr) - 1, np.inf)
-    heap_keys, heap_nodes, size = np.empty(1024), np.empty(1024, np.int32), 0
+    """Dijkstra from several sources at once: the distance of every node."""
+    n = len(indptr) - 1
+    tentative = np.full(n, np.inf)
+    keys, items, size = np.empty(len(sources) + 1024), np.empty(len(sources) + 1024, np.int32), 0
     for source in sources:
         if tentative[source] > 0.0:
             tentative[source] = 0.0
-            heap_keys, heap_nodes = _push(heap_keys, heap_nodes, size, 0.0, np.int32(source))
+            heap_add(keys, items, size, 0.0, np.int32(source))
             size += 1
-    while size > 0:
-        distance, node = heap_keys[0], heap_nodes[0]
-        size -= 1
-        _drop_first(heap_keys, heap_nodes, size)
-        if distance > tentative[node]:
-            continue
-        for e in range(indptr[node], indptr[node + 1]):
-            other, reached = indices[e], distance + lengths[e]
-            if reached < tentative[other] and reached <= limit:
-                tentative[other] = reached
-                heap_keys, heap_nodes = _push(heap_keys, heap_nodes, size, reached, other)
-                size += 1
+    settle(indptr, indices, lengths, limit, tentative, keys, items, size, np.empty(n, np.int32), np.empty(n))
     return tentative

@@ -5,6 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.graph.splat_graph import SplatGraph
+from splap_editor.core.surface.shortest_paths import heap_add, heap_replace_first, settle, twice_as_long
 
 
 def farthest_nodes(graph: SplatGraph, count: int) -> NDArray[np.int64]:
@@ -74,80 +75,36 @@ def nearest_samples(
 
 
 @nb.njit(nogil=True, cache=True)
-def _sift_up(keys, items, i, key, item):
-    """Put an entry at leaf i of a binary heap, least key first."""
-    while i > 0:
-        up = (i - 1) >> 1
-        if keys[up] <= key:
-            break
-        keys[i] = keys[up]
-        items[i] = items[up]
-        i = up
-    keys[i] = key
-    items[i] = item
-
-
-@nb.njit(nogil=True, cache=True)
-def _sift_down(keys, items, size, key, item):
-    """Put an entry in place of the first of a binary heap of ``size`` entries."""
-    i = 0
-    while True:
-        child = 2 * i + 1
-        if child >= size:
-            break
-        if child + 1 < size and keys[child + 1] < keys[child]:
-            child += 1
-        if keys[child] >= key:
-            break
-        keys[i] = keys[child]
-        items[i] = items[child]
-        i = child
-    keys[i] = key
-    items[i] = item
-
-
-@nb.njit(nogil=True, cache=True)
 def _farthest(seeds, indptr, indices, lengths, count):
+    """Up to ``count`` nodes: the seeds, then again and again the one farthest from all so far."""
     n = indptr.size - 1
     distances = np.full(n, np.inf)
-    keys, items = np.empty(indices.size + n + 1), np.empty(indices.size + n + 1, np.int64)
+    keys, items = np.empty(1024), np.empty(1024, np.int32)
+    near, far = np.empty(n, np.int32), np.empty(n)
     # Distances only fall, so a node's place among the farthest is corrected when it comes to the top.
-    far_keys, far_items = np.empty(n), np.empty(n, np.int64)
+    far_keys, far_items = np.empty(n), np.empty(n, np.int32)
     n_far = 0
     chosen = np.empty(count, np.int64)
     n_chosen = 0
     while n_chosen < count:
         if n_chosen < seeds.size:
-            node = seeds[n_chosen]
+            node = np.int32(seeds[n_chosen])
         else:
             if n_chosen == seeds.size:
                 for i in range(n):
                     if distances[i] < np.inf:
-                        _sift_up(far_keys, far_items, n_far, -distances[i], i)
+                        heap_add(far_keys, far_items, n_far, -distances[i], np.int32(i))
                         n_far += 1
             while n_far > 0 and -far_keys[0] > distances[far_items[0]]:
-                _sift_down(far_keys, far_items, n_far, -distances[far_items[0]], far_items[0])
+                heap_replace_first(far_keys, far_items, n_far, -distances[far_items[0]], far_items[0])
             if n_far == 0 or far_keys[0] == 0.0:
                 break
             node = far_items[0]
         chosen[n_chosen] = node
         n_chosen += 1
         distances[node] = 0.0
-        keys[0], items[0], size = 0.0, node, 1
-        while size > 0:
-            key, i = keys[0], items[0]
-            size -= 1
-            if size > 0:
-                _sift_down(keys, items, size, keys[size], items[size])
-            if key > distances[i]:
-                continue
-            for m in range(indptr[i], indptr[i + 1]):
-                j = indices[m]
-                distance = key + lengths[m]
-                if distance < distances[j]:
-                    distances[j] = distance
-                    _sift_up(keys, items, size, distance, j)
-                    size += 1
+        keys[0], items[0] = 0.0, node
+        _, keys, items = settle(indptr, indices, lengths, np.inf, distances, keys, items, 1, near, far)
     return chosen[:n_chosen]
 
 
@@ -156,19 +113,17 @@ def _spread_samples(samples, indptr, indices, lengths, limit, near, distances):
     """Dijkstra from all samples at once in which a node may be reached by k of them."""
     n, k = near.shape
     counts = np.zeros(n, np.int32)
-    capacity = max(1024, samples.size)
     # An item is node · m + sample.
     m_samples = max(1, samples.size)
-    keys, items = np.empty(capacity), np.empty(capacity, np.int64)
+    keys, items = np.empty(samples.size + 1024), np.empty(samples.size + 1024, np.int64)
     size = 0
     for sample in range(samples.size):
-        keys[size], items[size] = 0.0, samples[sample] * m_samples + sample
+        heap_add(keys, items, size, 0.0, samples[sample] * m_samples + sample)
         size += 1
     while size > 0:
         key, item = keys[0], items[0]
         size -= 1
-        if size > 0:
-            _sift_down(keys, items, size, keys[size], items[size])
+        heap_replace_first(keys, items, size, keys[size], items[size])
         i, sample = item // m_samples, item % m_samples
         count = counts[i]
         if count == k or _is_near(near[i], count, sample):
@@ -181,17 +136,15 @@ def _spread_samples(samples, indptr, indices, lengths, limit, near, distances):
             distance = key + lengths[m]
             if distance > limit or counts[j] == k or _is_near(near[j], counts[j], sample):
                 continue
-            if size == keys.size:
-                longer_keys, longer_items = np.empty(2 * size), np.empty(2 * size, np.int64)
-                longer_keys[:size] = keys
-                longer_items[:size] = items
-                keys, items = longer_keys, longer_items
-            _sift_up(keys, items, size, distance, j * m_samples + sample)
+            if size == len(keys):
+                keys, items = twice_as_long(keys), twice_as_long(items)
+            heap_add(keys, items, size, distance, j * m_samples + sample)
             size += 1
 
 
 @nb.njit(nogil=True, cache=True)
 def _is_near(near, count, sample):
+    """Whether a sample is among the first ``count`` that reached a node."""
     for c in range(count):  # noqa: SIM110 - compiled: a generator would be slow
         if near[c] == sample:
             return True
