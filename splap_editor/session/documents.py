@@ -11,6 +11,7 @@ from splap_editor.io.session_specs import SessionFile
 from splap_editor.session.jobs import Job, Post, Worker
 from splap_editor.session.saved_state import Look, SavedState, restore_scene, saved_state, session_file_of
 from splap_editor.session.scene import Scene
+from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.session.signals import Signal
 
@@ -88,7 +89,14 @@ class Documents:
         self._arrival: _Arrival | None = None
         self._source = _Source(Path())
         self._kept: SavedState | None = None
-        session.scene_changed.connect(self._on_scene_changed)
+        SceneFollower(
+            session,
+            self._on_scene_changed,
+            edit_changed=self.changed.emit,
+            hidden_changed=self.changed.emit,
+            selection_changed=self.changed.emit,
+            selection_sets_changed=self.changed.emit,
+        )
 
     def close(self) -> None:
         """Finish saving and join the worker."""
@@ -165,10 +173,6 @@ class Documents:
         arrival, self._arrival = self._arrival, None
         self._source = source = _Source(scene.file.path)
         self.worker.submit(Job("hash", "", lambda job: _take_digest(source)), cancels=("hash",))
-        scene.edit_changed.connect(self.changed.emit)
-        scene.hidden_changed.connect(self.changed.emit)
-        scene.selection_changed.connect(self.changed.emit)
-        scene.selection_sets_changed.connect(self.changed.emit)
         if arrival is None or arrival.scene is not scene:
             self.path = None
             self._kept = self.state()

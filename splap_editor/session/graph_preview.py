@@ -6,6 +6,7 @@ from splap_editor.core.graph.splat_graph import GraphOptions, SplatGraph, splat_
 from splap_editor.engine.parallel_lock import alone
 from splap_editor.session.jobs import REPORT_SECONDS, Job
 from splap_editor.session.latest_job import LatestJob
+from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.session.signals import Signal
 
@@ -28,7 +29,7 @@ class GraphPreview:
         self.error = ""
         self._session = session
         self._job = LatestJob(session.detail_worker, "preview", cancels=True, failed=self._on_failed)
-        session.scene_changed.connect(self.clear)
+        SceneFollower(session, self.clear)
 
     @property
     def is_busy(self) -> bool:

@@ -24,6 +24,7 @@ from splap_editor.session.commands import ChangeEdit, ChangeMask
 from splap_editor.session.history import History
 from splap_editor.session.jobs import Job, Post, Worker
 from splap_editor.session.scene import Scene
+from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.signals import Signal
 from splap_editor.session.work import Depictor, bound_edit, exported_file, opened_scene, prepared_surface
 
@@ -62,6 +63,7 @@ class Session:
         self.depictor: Depictor | None = None
         self.awaits_drag = False  # whether the next pose of a drag is on its way
         self.scene_changed = Signal()
+        SceneFollower(self, edit_changed=self._advance, preview_changed=self._advance)
         self.job_changed = Signal()
         self.state_changed = Signal()
         self.failed = Signal()
@@ -350,8 +352,6 @@ class Session:
         self.is_halted = False
         self.scene = scene
         self.history.clear()
-        scene.edit_changed.connect(self._advance)
-        scene.preview_changed.connect(self._advance)
         self.scene_changed.emit()
         self._advance()
 

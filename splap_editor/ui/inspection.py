@@ -6,6 +6,7 @@ import numpy as np
 from PySide6.QtWidgets import QLabel, QWidget
 
 from splap_editor.session.graph_preview import GraphPreview
+from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.session.signals import Signal
 from splap_editor.tools.probe_tool import ProbeTool
@@ -90,7 +91,7 @@ class Inspection:
     def _connect(self, session: Session) -> None:
         self.quantities.changed.connect(self._show_value)
         self.probe.changed.connect(self._show_value)
-        session.scene_changed.connect(self.probe.cancel)
+        SceneFollower(session, self.probe.cancel)
         self._tools.chosen_changed.connect(self._on_tool_chosen)
         self.inspected.changed.connect(self.changed.emit)
         self.commands.kept_changed.connect(self.changed.emit)

@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
 import splap_editor
 from splap_editor.session.autosave import Autosave
 from splap_editor.session.documents import Documents
+from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.tools.select_tool import SelectTool
 from splap_editor.tools.tool import ToolContext, ToolManager
@@ -142,7 +143,15 @@ class MainWindow(FileDrop, QMainWindow):
         viewport.compare_held.connect(display.hold_original)
         viewport.menu_wanted.connect(self._on_menu_wanted)
         viewport.frame_drawn.connect(self.deformer_panel.show_timing)
-        session.scene_changed.connect(self._on_scene_changed)
+        SceneFollower(
+            session,
+            self._on_scene_changed,
+            selection_changed=self._refresh,
+            hidden_changed=self._refresh,
+            active_handles_changed=self._refresh,
+            surface_changed=self._refresh,
+            edit_changed=self._on_edit_changed,
+        )
         session.history.changed.connect(self._refresh)
         session.state_changed.connect(self._refresh)
         session.exported.connect(lambda report: self._refresh())
@@ -298,12 +307,6 @@ class MainWindow(FileDrop, QMainWindow):
     def _on_scene_changed(self) -> None:
         up = tuple(self.view.viewport.camera.world_up)
         self.actions_.check({(0.0, 0.0, 1.0): "view.up_z", (0.0, -1.0, 0.0): "view.down_y"}.get(up, "view.up_y"))
-        scene = self.session.scene
-        scene.selection_changed.connect(self._refresh)
-        scene.hidden_changed.connect(self._refresh)
-        scene.active_handles_changed.connect(self._refresh)
-        scene.surface_changed.connect(self._refresh)
-        scene.edit_changed.connect(self._on_edit_changed)
         self.display.apply(self.view)
         self.overlay.show_hint(*(() if self._has_hinted else HINT))
         self._refresh()

@@ -10,6 +10,7 @@ from splap_editor.core.graph.ellipse_offset import normal_offsets
 from splap_editor.engine.pipeline import Surface
 from splap_editor.session.jobs import Job
 from splap_editor.session.latest_job import LatestJob
+from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.session.signals import Signal
 from splap_editor.viewport.colormaps import label_colors, mapped_colors, shares
@@ -111,7 +112,14 @@ class GraphView:
         self._session = session
         self._view = view
         self._job = LatestJob(session.detail_worker, "edges")
-        session.scene_changed.connect(self._on_scene_changed)
+        SceneFollower(
+            session,
+            self._on_scene_changed,
+            surface_changed=self._update,
+            hidden_changed=self._update,
+            selection_changed=self._on_selection_changed,
+            picked_changed=self._on_selection_changed,
+        )
 
     def set(self, **values: Any) -> None:
         """Change some options."""
@@ -126,12 +134,7 @@ class GraphView:
         return len(self.rows)
 
     def _on_scene_changed(self) -> None:
-        scene = self._session.scene
         self.colored = None
-        for signal in (scene.surface_changed, scene.hidden_changed):
-            signal.connect(self._update)
-        for signal in (scene.selection_changed, scene.picked_changed):
-            signal.connect(self._on_selection_changed)
         self._update()
 
     def _on_selection_changed(self) -> None:

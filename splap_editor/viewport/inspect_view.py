@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from splap_editor.session.neighbor_sets import NeighborComparison, compared, neighbor_set
 from splap_editor.session.scene import Scene
+from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.session.signals import Signal
 from splap_editor.viewport.scene_view import SceneView
@@ -59,7 +60,13 @@ class InspectView:
         self._is_on = False
         self._session = session
         self._view = view
-        session.scene_changed.connect(self._on_scene_changed)
+        SceneFollower(
+            session,
+            self._on_scene_changed,
+            picked_changed=self._update,
+            surface_changed=self._update,
+            pose_changed=self._draw_lines,
+        )
 
     @property
     def is_on(self) -> bool:
@@ -101,11 +108,7 @@ class InspectView:
     # Following the scene ------------------------------------------------------------------------------------------
 
     def _on_scene_changed(self) -> None:
-        scene = self._session.scene
         self.edge = self.comparison = None
-        scene.picked_changed.connect(self._update)
-        scene.surface_changed.connect(self._update)
-        scene.pose_changed.connect(self._draw_lines)
         self._update()
 
     def _update(self) -> None:

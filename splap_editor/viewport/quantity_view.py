@@ -10,6 +10,7 @@ from splap_editor.engine.quantities import QUANTITIES, Quantity, Snapshot, missi
 from splap_editor.session.bound_edit import snapshot_of
 from splap_editor.session.jobs import Job
 from splap_editor.session.latest_job import LatestJob
+from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.session.signals import Signal
 from splap_editor.viewport.colormaps import TWO_SIDED, label_colors, mapped_colors, shares
@@ -153,7 +154,14 @@ class QuantityView:
         self._session = session
         self._view = view
         self._job = LatestJob(session.detail_worker, "quantity", failed=self._on_failed)
-        session.scene_changed.connect(self._on_scene_changed)
+        SceneFollower(
+            session,
+            self._on_scene_changed,
+            pose_changed=self._ask,
+            surface_changed=self._ask,
+            picked_changed=self._ask,
+            active_handles_changed=self._ask,
+        )
         session.state_changed.connect(self._on_state_changed)
 
     def set(self, **values: Any) -> None:
@@ -176,14 +184,6 @@ class QuantityView:
         return f"{self.shown.quantity.label}: {value_text(self.shown.quantity, float(self.shown.values[row]))}"
 
     def _on_scene_changed(self) -> None:
-        scene = self._session.scene
-        for signal in (
-            scene.pose_changed,
-            scene.surface_changed,
-            scene.picked_changed,
-            scene.active_handles_changed,
-        ):
-            signal.connect(self._ask)
         self._take(None)
         self._ask()
 

@@ -13,6 +13,7 @@ from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.edit import Handle
 from splap_editor.session.jobs import Job
 from splap_editor.session.scene import Scene
+from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.viewport.depth_order import depth_order
 from splap_editor.viewport.glyphs import Glyphs, base_colors, splat_glyphs
@@ -126,12 +127,22 @@ class SceneView:
         viewport.splats.view_turned = self._on_view_turned
         session.depictor = depiction
         session.presenter = lambda kernels: presented(self._depicted, kernels, self._seen)
-        session.scene_changed.connect(self._on_scene_changed)
+        self._follower = SceneFollower(
+            session,
+            self._on_scene_changed,
+            pose_changed=self._show_pose,
+            selection_changed=self._show_flags,
+            hidden_changed=self._show_flags,
+            edit_changed=self._show_handles,
+            preview_changed=self._show_handles,
+            active_handles_changed=self._show_handles,
+        )
         session.state_changed.connect(self._show_tints)
         self.weights = WeightView(session, viewport, self.paint)
 
     def close(self) -> None:
         """Let go of session and viewport."""
+        self._follower.close()
         self._session.presenter = self._session.depictor = None
         self._scene = None
         self.viewport.close()
@@ -197,12 +208,6 @@ class SceneView:
         self._scene = scene = self._session.scene
         self._tinted_for, self._paints, self._marks = (), {}, ()
         self.viewport.gizmo.detach()
-        scene.pose_changed.connect(self._show_pose)
-        scene.selection_changed.connect(self._show_flags)
-        scene.hidden_changed.connect(self._show_flags)
-        scene.edit_changed.connect(self._show_handles)
-        scene.preview_changed.connect(self._show_handles)
-        scene.active_handles_changed.connect(self._show_handles)
         self._depicted = scene.depicted if scene.depicted is not None else depiction(scene.splats)
         self.viewport.splats.load(self._depicted.rest, self._depicted.colors)
         self.viewport.camera.world_up = np.array(self.preferred_up or suggested_up(scene.splats))

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from splap_editor.core.handle_nodes import Region, handle_nodes
 from splap_editor.engine.edit import Handle
 from splap_editor.session.scene import Scene
+from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.session.signals import Signal
 from splap_editor.session.weight_report import cage_radius, splat_weights
@@ -40,7 +41,13 @@ class WeightView:
         self._is_on = False
         self._painted: tuple[object, int] | None = None
         self._nodes: tuple[Region | None, NDArray[np.float64]] = (None, np.empty((0, 3)))
-        session.scene_changed.connect(self._on_scene_changed)
+        SceneFollower(
+            session,
+            self._on_scene_changed,
+            active_handles_changed=self._show,
+            edit_changed=self._show,
+            preview_changed=self._show,
+        )
         session.state_changed.connect(self._show_weights)
 
     @property
@@ -58,11 +65,8 @@ class WeightView:
         self._show_cage(radius)
 
     def _on_scene_changed(self) -> None:
-        scene = self._session.scene
         self._nodes = (None, np.empty((0, 3)))
         self._painted = None
-        for signal in (scene.active_handles_changed, scene.edit_changed, scene.preview_changed):
-            signal.connect(self._show)
         self._show()
 
     def _show(self) -> None:

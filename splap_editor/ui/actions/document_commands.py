@@ -13,6 +13,7 @@ from splap_editor.io.session_specs import Scalar, SessionFile, ViewSpec
 from splap_editor.session.autosave import Autosave
 from splap_editor.session.documents import Documents, MissingPlyError
 from splap_editor.session.saved_state import Look
+from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.ui.actions.file_commands import folder_to_write, sample_path, sentence
 from splap_editor.ui.actions.recent_files import RecentFiles
@@ -64,7 +65,7 @@ class DocumentCommands:
         documents.saved.connect(self._on_saved)
         documents.failed.connect(self._on_failed)
         autosave.failed.connect(self._on_autosave_failed)
-        session.scene_changed.connect(self._note_recent)
+        SceneFollower(session, self._note_recent)
 
     def save(self) -> None:
         """Save to the session file; ask where to if there is none yet."""

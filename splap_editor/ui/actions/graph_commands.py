@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from splap_editor.core.graph.splat_graph import GraphOptions
 from splap_editor.session.cards import has_edge
 from splap_editor.session.mends import best_links, edges_between, fragment_links, fragments, with_added, with_cut
+from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.session.signals import Signal
 from splap_editor.viewport.graph_view import SHOWN, GraphView
@@ -40,7 +41,7 @@ class GraphCommands:
         self._graph_view = graph_view
         self._inspected = inspected
         self._say = say
-        session.scene_changed.connect(self._forget)
+        SceneFollower(session, self._forget)
 
     def meets(self, condition: str) -> bool:
         """Whether a condition of `CONDITIONS` holds."""

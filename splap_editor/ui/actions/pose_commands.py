@@ -6,6 +6,7 @@ from splap_editor.core.splats.symmetry import Plane, object_center, symmetry_pla
 from splap_editor.engine.pose import Pose
 from splap_editor.session.jobs import Job
 from splap_editor.session.pose_tools import NoMirrorImageError, mirrored_handles, pasted_poses
+from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.ui.widgets.toast import Toast
 
@@ -25,7 +26,7 @@ class PoseCommands:
         self._toast = toast
         self._copied: tuple[Pose, ...] = ()
         self._symmetry: Plane | None = None
-        session.scene_changed.connect(self._on_scene_changed)
+        SceneFollower(session, self._on_scene_changed)
 
     def copy(self) -> None:
         """Remember the poses of the chosen handles."""

@@ -4,6 +4,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QInputDialog, QMenu, QWidget
 
 from splap_editor.session.commands import ChangeSelectionSets
+from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 
 
@@ -20,7 +21,7 @@ class SelectionSetsMenu(QMenu):
         super().__init__("Select ke&pt", parent)
         self._session = session
         self._forget_menu = QMenu("&Forget", self)
-        session.scene_changed.connect(self._on_scene_changed)
+        SceneFollower(session, self._fill, selection_sets_changed=self._fill)
         self.setEnabled(False)
 
     def keep(self) -> None:
@@ -51,10 +52,6 @@ class SelectionSetsMenu(QMenu):
 
     def _change(self, sets: dict, label: str) -> None:
         self._session.history.push(ChangeSelectionSets(self._session.scene, sets, label))
-
-    def _on_scene_changed(self) -> None:
-        self._session.scene.selection_sets_changed.connect(self._fill)
-        self._fill()
 
     def _fill(self) -> None:
         names = list(self._session.scene.selection_sets)

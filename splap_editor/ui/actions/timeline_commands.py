@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QWidget
 from splap_editor.engine.edit import Edit
 from splap_editor.engine.keyframes import edit_at_frame, keyed_edit
 from splap_editor.engine.timeline import Timeline
+from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.ui.actions.file_commands import sentence
 from splap_editor.ui.dialogs.frames_dialog import FramesDialog
@@ -42,7 +43,7 @@ class TimelineCommands(QObject):
         self._toast = toast
         self._is_shown = False
         self.player = Player(session, viewport, self)
-        session.scene_changed.connect(self._on_scene_changed)
+        SceneFollower(session, self._show_if_keyed, edit_changed=self._show_if_keyed)
 
     @property
     def _edit(self) -> Edit:
@@ -155,10 +156,6 @@ class TimelineCommands(QObject):
         self.player.stop()
         edit = replace(self._edit, timeline=timeline)
         self._session.change_edit(edit_at_frame(edit, timeline.frame) if timeline.keys else edit, label)
-
-    def _on_scene_changed(self) -> None:
-        self._session.scene.edit_changed.connect(self._show_if_keyed)
-        self._show_if_keyed()
 
     def _show_if_keyed(self) -> None:
         if self._edit.timeline.keys and not self._is_shown:

@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QCheckBox, QComboBox, QGridLayout, QLabel, QVBoxLa
 
 from splap_editor.engine.edit import Edit
 from splap_editor.session.scene import Scene
+from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.ui.panels.weights_form import WeightsForm
 from splap_editor.ui.theme import STEP
@@ -129,7 +130,7 @@ class DeformerPanel(QWidget):
         layout.addLayout(reach)
         layout.addWidget(self.kernels)
         layout.addWidget(self.weights)
-        session.scene_changed.connect(self._on_scene_changed)
+        SceneFollower(session, self._on_scene_changed, edit_changed=self._show, pose_changed=self.show_state)
         session.state_changed.connect(self.show_state)
         self._show()
 
@@ -176,9 +177,6 @@ class DeformerPanel(QWidget):
 
     def _on_scene_changed(self) -> None:
         self._scene = self._session.scene
-        if self._scene is not None:
-            self._scene.edit_changed.connect(self._show)
-            self._scene.pose_changed.connect(self.show_state)
         self._show()
 
     def _show(self) -> None:

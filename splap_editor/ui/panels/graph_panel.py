@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
 
 from splap_editor.core.graph.splat_graph import GraphOptions, SplatGraph
 from splap_editor.session.graph_preview import GraphPreview
+from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.ui.actions.actions import ActionSet
 from splap_editor.ui.actions.graph_commands import GraphCommands
@@ -107,7 +108,7 @@ class GraphPanel(QWidget):
         view.changed.connect(self._show_view)
         preview.changed.connect(self._show_estimate)
         commands.kept_changed.connect(self._show_mends)
-        session.scene_changed.connect(self._on_scene_changed)
+        SceneFollower(session, self._on_scene_changed, surface_changed=self._show, edit_changed=self._show)
         self._show()
 
     def set_actions(self, actions: ActionSet) -> None:
@@ -135,10 +136,7 @@ class GraphPanel(QWidget):
     # Showing ------------------------------------------------------------------------------------------------------
 
     def _on_scene_changed(self) -> None:
-        scene = self._session.scene
         self._wanted = self._listed = None
-        scene.surface_changed.connect(self._show)
-        scene.edit_changed.connect(self._show)
         self._show()
 
     @property

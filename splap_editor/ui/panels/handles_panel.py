@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
 
 from splap_editor.engine.edit import Handle, Pose
 from splap_editor.session.scene import Scene
+from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.session.weight_report import cage_radius
 from splap_editor.ui.panels.cage_form import CageForm
@@ -58,15 +59,17 @@ class HandlesPanel(QWidget):
         layout.addWidget(self.pose_form)
         layout.addWidget(self.cage_form)
         layout.addLayout(pins)
-        session.scene_changed.connect(self._on_scene_changed)
+        SceneFollower(
+            session,
+            self._on_scene_changed,
+            edit_changed=self._show,
+            preview_changed=self._show_pose,
+            active_handles_changed=self._show_active,
+        )
         self._show()
 
     def _on_scene_changed(self) -> None:
         self._scene = self._session.scene
-        if self._scene is not None:
-            self._scene.edit_changed.connect(self._show)
-            self._scene.preview_changed.connect(self._show_pose)
-            self._scene.active_handles_changed.connect(self._show_active)
         self._show()
 
     def _show(self) -> None:

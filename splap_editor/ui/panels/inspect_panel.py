@@ -10,6 +10,7 @@ from splap_editor.core.graph.splat_graph import GraphOptions
 from splap_editor.session.cards import EdgeCard, SplatCard, edge_card, has_edge, splat_card
 from splap_editor.session.graph_preview import GraphPreview
 from splap_editor.session.neighbor_sets import NEIGHBOR_KINDS
+from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.ui.theme import STEP
 from splap_editor.ui.widgets.number_field import NumberField
@@ -52,7 +53,7 @@ class InspectPanel(QWidget):
         self._add_parts()
         inspected.changed.connect(self._show)
         preview.changed.connect(self._show_verdict)
-        session.scene_changed.connect(self._show)
+        SceneFollower(session, self._show)
         self._show()
 
     def _add_parts(self) -> None:

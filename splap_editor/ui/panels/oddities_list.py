@@ -7,6 +7,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWi
 from splap_editor.session.detective import Oddity, oddities
 from splap_editor.session.jobs import Job
 from splap_editor.session.scene import Scene
+from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.ui.theme import STEP
 
@@ -26,7 +27,7 @@ class OdditiesList(QWidget):
         self.status = QLabel()
         self.status.setProperty("tone", "quiet")
         self._list.addWidget(self.status)
-        session.scene_changed.connect(self._on_scene_changed)
+        SceneFollower(session, self._on_scene_changed)
 
     def _on_scene_changed(self) -> None:
         scene = self._session.scene

@@ -4,6 +4,7 @@ import numpy as np
 from PySide6.QtWidgets import QCheckBox, QComboBox, QGridLayout, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
 from splap_editor.engine.quantities import QUANTITIES
+from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.selection import SelectionMode, combined_selection
 from splap_editor.session.session import Session
 from splap_editor.ui.theme import STEP
@@ -51,7 +52,7 @@ class QuantityPanel(QWidget):
             combo.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         self._add_parts()
         view.changed.connect(self._show)
-        session.scene_changed.connect(lambda: self.setEnabled(session.scene is not None))
+        SceneFollower(session, lambda: self.setEnabled(session.scene is not None))
         self.setEnabled(session.scene is not None)
         self._show()
 

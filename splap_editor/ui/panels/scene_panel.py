@@ -6,6 +6,7 @@ from PySide6.QtWidgets import QGridLayout, QLabel, QVBoxLayout, QWidget
 from splap_editor.engine.scene_info import graph_info
 from splap_editor.session.detective import reading, verdict
 from splap_editor.session.scene import Scene
+from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.ui.panels.layout_form import LayoutForm
 from splap_editor.ui.panels.oddities_list import OdditiesList
@@ -61,7 +62,7 @@ class ScenePanel(QWidget):
         self.oddities = OdditiesList(session)
         layout.addWidget(self.layout_form)
         layout.addWidget(self.oddities)
-        session.scene_changed.connect(self._on_scene_changed)
+        SceneFollower(session, self._on_scene_changed, surface_changed=self._show_surface)
         self._on_scene_changed()
 
     def _on_scene_changed(self) -> None:
@@ -72,7 +73,6 @@ class ScenePanel(QWidget):
             for value in self.facts.values():
                 value.setText("–")
             return
-        scene.surface_changed.connect(self._show_surface)
         splats, file = scene.splats, scene.file
         n_inert = splats.n_splats - scene.ellipses.n_nodes
         self.facts["file"].setText(file.path.name)

@@ -7,6 +7,7 @@ from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from splap_editor.engine.edit import Edit
 from splap_editor.engine.keyframes import edit_at_frame
 from splap_editor.session.scene import Scene
+from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.viewport.viewport import Viewport
 
@@ -36,7 +37,7 @@ class Player(QObject):
         self._start = (0.0, 1)
         self._timer = QTimer(self, interval=TICK_MS, timerType=Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self._on_tick)
-        session.scene_changed.connect(self.stop)
+        SceneFollower(session, self.stop)
 
     @property
     def is_playing(self) -> bool:

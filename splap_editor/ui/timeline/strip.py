@@ -4,6 +4,7 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QWidget
 
 from splap_editor.engine.timeline import LAST_FRAME
+from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.ui.actions.actions import ActionSet
 from splap_editor.ui.actions.timeline_commands import TimelineCommands
@@ -58,14 +59,8 @@ class TimelineStrip(QWidget):
         self.fps_field.committed.connect(lambda fps: commands.change("Change speed", fps=float(fps)))
         commands.shown_changed.connect(self.setVisible)
         commands.player.playing_changed.connect(lambda on: actions.check("timeline.play", on))
-        session.scene_changed.connect(self._on_scene_changed)
+        SceneFollower(session, self._show, edit_changed=self._show, preview_changed=self._show)
         self.hide()
-
-    def _on_scene_changed(self) -> None:
-        scene = self._session.scene
-        scene.edit_changed.connect(self._show)
-        scene.preview_changed.connect(self._show)
-        self._show()
 
     def _show(self) -> None:
         timeline = self._session.scene.shown_edit.timeline

@@ -2,6 +2,7 @@
 
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
 
+from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.tools.tool import ToolManager
 from splap_editor.ui.theme import STEP
@@ -22,20 +23,13 @@ class StateLine(QWidget):
         layout.setSpacing(6 * STEP)
         layout.addWidget(self.hint)
         layout.addWidget(self.counts)
-        session.scene_changed.connect(self._on_scene_changed)
+        SceneFollower(session, self._show_counts, selection_changed=self._show_counts, hidden_changed=self._show_counts)
         tools.chosen_changed.connect(self.show_hint)
         self.show_hint()
 
     def show_hint(self) -> None:
         """Show the chosen tool's hint."""
         self.hint.setText(self._tools.chosen.hint)
-
-    def _on_scene_changed(self) -> None:
-        scene = self._session.scene
-        if scene is not None:
-            scene.selection_changed.connect(self._show_counts)
-            scene.hidden_changed.connect(self._show_counts)
-        self._show_counts()
 
     def _show_counts(self) -> None:
         scene = self._session.scene
