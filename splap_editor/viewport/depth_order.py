@@ -19,13 +19,21 @@ def _counting_sort(means, direction, order):
     scale = np.float32(_BINS - 1) / max(farthest - nearest, np.float32(1e-30))
     starts = np.zeros(_BINS + 1, np.int32)
     for i in range(n):
-        starts[np.int32((farthest - keys[i]) * scale) + 1] += 1
+        starts[_bin(farthest - keys[i], scale) + 1] += 1
     for b in range(_BINS):
         starts[b + 1] += starts[b]
     for i in range(n):
-        b = np.int32((farthest - keys[i]) * scale)
+        b = _bin(farthest - keys[i], scale)
         order[starts[b]] = i
         starts[b] += 1
+
+
+@nb.njit(inline="always")
+def _bin(behind, scale):
+    """Bin of a distance to the farthest splat; that of one that is no number is the last."""
+    place = behind * scale
+    # A comparison with NaN is false: nothing but a number in range is ever converted.
+    return np.int64(place) if 0.0 <= place <= _BINS - 1 else np.int64(_BINS - 1)
 
 
 def depth_order(means: NDArray[np.float32], direction: NDArray[np.floating]) -> NDArray[np.int32]:
@@ -38,7 +46,7 @@ def depth_order(means: NDArray[np.float32], direction: NDArray[np.floating]) -> 
     Parameters
     ----------
     means : (N, 3) float32, C-contiguous
-        Finite centres, in any common frame.
+        Centres, in any common frame. One whose depth is not finite comes somewhere.
     direction : (3,) float
         From the eye into the scene, any length but zero.
 

@@ -28,3 +28,12 @@ def test_no_and_one_splat_have_an_order():
 def test_rejects_double_precision():
     with pytest.raises(ValueError, match="float32"):
         depth_order(np.zeros((4, 3)), np.array([0.0, 0.0, 1.0]))
+
+
+@pytest.mark.parametrize("value", [3e38, -3e38, np.inf, -np.inf, np.nan])
+def test_depths_that_are_not_finite_leave_a_permutation(value):
+    means = np.random.default_rng(0).normal(size=(300, 3)).astype(np.float32)
+    means[::7] = value
+    for direction in ((1.0, 1.0, 1.0), (0.0, 0.0, -1.0), (1e38, 1e38, 0.0)):
+        order = depth_order(means, np.array(direction))
+        np.testing.assert_array_equal(np.sort(order), np.arange(300))
