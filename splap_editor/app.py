@@ -85,7 +85,8 @@ def run(path: Path | None = None) -> int:
 def make_window(cache: StageCache | None = None) -> MainWindow:
     """Make the window and everything in it, nothing open yet."""
     mailbox = Mailbox()
-    session = Session(mailbox.post, cache=cache or StageCache())
+    cache = cache or StageCache()
+    session = Session(mailbox.post, cache=cache)
     widget = ViewportWidget()
     scale = widget.devicePixelRatioF()
     pacer = FramePacer(session, widget.update)
@@ -110,6 +111,7 @@ def make_window(cache: StageCache | None = None) -> MainWindow:
     widget.connect_tools(tools.pointer, tools.key)
     window = MainWindow(session, documents, autosave, widget, view, context, tools, Display())
     axes.fly_to = window.view_commands.fly_to
+    cache.say = lambda text: mailbox.post(lambda: window.toast.say(text))
     mailbox.setParent(window)
     return window
 

@@ -152,7 +152,7 @@ def _deform(options: argparse.Namespace) -> int:
     edit = edit_for(held, file, report.say)
     kernels = handles = deformer = deformation = surface = None
     if edit.active_handles or columns:
-        cache = None if options.no_cache else StageCache()
+        cache = None if options.no_cache else StageCache(say=lambda text: report.say(f"note: {text}"))
         surface = surface_of(file.splats, edit.graph, cache=cache, stages=report.stage)
         report.end_stage()
     if edit.active_handles:

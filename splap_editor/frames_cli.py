@@ -120,7 +120,7 @@ def _prepared(
     for warning in file.warnings:
         report.say(f"note: {warning}")
     edit = edit_for(held, file, report.say)
-    cache = None if options.no_cache else StageCache()
+    cache = None if options.no_cache else StageCache(say=lambda text: report.say(f"note: {text}"))
     surface = None
     if edit.active_handles:
         surface = surface_of(file.splats, edit.graph, cache=cache, stages=report.stage)

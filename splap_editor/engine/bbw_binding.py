@@ -13,10 +13,10 @@ from splap_editor.core.bbw.box_qp import BoxQpReport
 from splap_editor.core.bbw.weights import BbwOptions, bbw_problem, handle_weight
 from splap_editor.core.deformer import Handles
 from splap_editor.core.progress import Cancelled, Progress, part_of
-from splap_editor.engine.cache import Arrays, StageCache, content_key
+from splap_editor.engine.cache import Arrays, StageCache, content_key, require_array, require_rows
 
-WEIGHTS_VERSION = 3
-"""Raised whenever the solver gives other weights than before."""
+WEIGHTS_VERSION = 4
+"""Raised whenever the solver gives other weights than before, or they are kept otherwise."""
 
 N_THREADS = 4
 """Handles solved at a time unless told otherwise; factorisation and compiled loops let go of Python's lock."""
@@ -57,13 +57,11 @@ def bbw_deformer(
     key = content_key(
         ("bbw", WEIGHTS_VERSION, surface.key, handles.indices, handles.labels, handles.centers, handles.cage_radii)
     )
-    kept = cache.load(key) if cache is not None else None
-    if kept is None:
-        weights, report = _solved(surface, handles, options, progress, stages, n_threads)
-        if cache is not None:
-            cache.store(key, _packed(weights, report))
-    else:
-        weights, report = _unpacked(kept, (len(rest), handles.n_handles))
+    shape = len(rest), handles.n_handles
+    kept = cache.load(key, lambda arrays: _unpacked(arrays, shape)) if cache is not None else None
+    weights, report = kept or _solved(surface, handles, options, progress, stages, n_threads)
+    if cache is not None and kept is None:
+        cache.store(key, _packed(weights, report))
     return BbwDeformer.from_weights(rest, handles, weights, options=options, report=report)
 
 
@@ -109,9 +107,9 @@ def _packed(weights: sp.csr_array, report: BbwReport) -> Arrays:
         [(q.kkt_residual, q.bound_violation, q.n_factorisations, q.fallback) for q in report.handles], np.float64
     ).reshape(-1, 4)
     return {
-        "indptr": weights.indptr,
-        "indices": weights.indices,
-        "data": weights.data,
+        "weights_indptr": weights.indptr.astype(np.int32),
+        "weights_indices": weights.indices.astype(np.int32),
+        "weights_data": weights.data,
         "qp": qp,
         "n_unknowns": np.array(report.n_unknowns, np.int64),
         "unreachable": np.array(report.unreachable, np.int64),
@@ -120,7 +118,15 @@ def _packed(weights: sp.csr_array, report: BbwReport) -> Arrays:
 
 
 def _unpacked(kept: Arrays, shape: tuple[int, int]) -> tuple[sp.csr_array, BbwReport]:
-    weights = sp.csr_array((kept["data"], kept["indices"], kept["indptr"]), shape=shape)
+    """Weights (n, H) and their report from the cache."""
+    n_nodes, n_handles = shape
+    require_rows(kept, "weights", n_nodes, n_handles)
+    require_array(kept["weights_data"], "weights_data", kept["weights_indices"].shape, np.float64)
+    require_array(kept["qp"], "qp", (n_handles, 4), np.float64)
+    require_array(kept["n_unknowns"], "n_unknowns", (None,), np.int64)
+    require_array(kept["unreachable"], "unreachable", (None,), np.int64)
+    require_array(kept["counts"], "counts", (2,), np.int64)
+    weights = sp.csr_array((kept["weights_data"], kept["weights_indices"], kept["weights_indptr"]), shape=shape)
     report = BbwReport(
         handles=tuple(
             BoxQpReport(kkt, violation, int(count), bool(fell)) for kkt, violation, count, fell in kept["qp"]

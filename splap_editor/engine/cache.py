@@ -1,27 +1,46 @@
 """Stage results on disk, so that the same scene opens fast the second time."""
 
+import contextlib
 import hashlib
 import os
+import struct
 import tempfile
-import zipfile
-from collections.abc import Iterable
+import threading
+import zlib
+from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import BinaryIO, TypeVar
 
 import numpy as np
 import platformdirs
 from numpy.typing import NDArray
 
+from splap_editor.io.npz import NpzError, NpzFile
+from splap_editor.io.regular_file import open_regular
+
 Arrays = dict[str, NDArray]
+T = TypeVar("T")
+
+_HEAD = struct.Struct("<16sQI")
+_MAGIC = b"SpLap cache 2\r\n\0"
+_CHUNK = 1 << 20
+
+
+class CacheEntryError(ValueError):
+    """An entry whose arrays are not what they should be."""
 
 
 class StageCache:
     """A bounded folder of array bundles, each under the hash of what it was made from.
 
-    Entries are written to a temporary file and renamed, so two processes may
-    share the folder and a crash leaves no half entry. An entry that cannot
-    be read (truncated, corrupt) is dropped and counts as missing. When the
-    folder passes its bound the entries used longest ago go first. A folder
-    that cannot be written is no error: nothing is kept then.
+    An entry is a check sum, then an ``.npz``. Entries are written to a
+    temporary file and renamed, so two processes may share the folder and a
+    crash leaves no half entry. Nothing of an entry is parsed before its bytes
+    are known to be those that were written, nothing of it is used before its
+    maker has looked at its shapes and indices; one that fails is dropped and
+    counts as missing. When the folder passes its bound the entries used
+    longest ago go first. A folder that cannot be written is no error: nothing
+    is kept then.
 
     Parameters
     ----------
@@ -29,25 +48,46 @@ class StageCache:
         ``SPLAP_CACHE_DIR`` or the user's cache folder by default.
     max_bytes : int
         Bound on the folder's size.
+    say : callable (sentence), optional
+        Told, once, that an entry was damaged; on the thread that loads.
     """
 
-    def __init__(self, folder: Path | None = None, max_bytes: int = 4 << 30) -> None:
+    def __init__(
+        self, folder: Path | None = None, max_bytes: int = 4 << 30, say: Callable[[str], None] | None = None
+    ) -> None:
         self.folder = folder or default_cache_folder() / "scenes"
         self.max_bytes = max_bytes
+        self.say = say
+        self._said = threading.Lock()
 
-    def load(self, key: str) -> Arrays | None:
-        """Read the arrays kept under ``key``, or None."""
+    def load(self, key: str, made: Callable[[Arrays], T]) -> T | None:
+        """Make something of the arrays kept under ``key``; None where there are none.
+
+        Parameters
+        ----------
+        key : str
+        made : callable
+            ``made(arrays)`` raises `CacheEntryError` or KeyError where they are not what it needs.
+        """
         path = self._path(key)
         try:
-            with open(path, "rb") as file, np.load(file, allow_pickle=False) as bundle:
-                arrays = {name: bundle[name] for name in bundle.files}  # reading each member checks its CRC
-            os.utime(path)
+            with open_regular(path) as file:
+                found = made(_checked_arrays(file))
         except (FileNotFoundError, NotADirectoryError):
             return None
-        except (OSError, ValueError, KeyError, EOFError, TypeError, AttributeError, zipfile.BadZipFile):
-            path.unlink(missing_ok=True)
+        except (OSError, NpzError, CacheEntryError, KeyError, MemoryError) as error:
+            self._drop(path, error)
             return None
-        return arrays
+        with contextlib.suppress(OSError):
+            os.utime(path)
+        return found
+
+    def _drop(self, path: Path, error: Exception) -> None:
+        """Remove an entry, and say so the first time."""
+        with contextlib.suppress(OSError):
+            path.unlink(missing_ok=True)
+        if self.say is not None and not isinstance(error, _EarlierFormatError) and self._said.acquire(blocking=False):
+            self.say(f"A prepared scene in {self.folder} was damaged: it is made again.")
 
     def store(self, key: str, arrays: Arrays) -> bool:
         """Keep arrays under ``key``; False when the disk did not take them."""
@@ -56,8 +96,12 @@ class StageCache:
             self.folder.mkdir(parents=True, exist_ok=True)
             handle, name = tempfile.mkstemp(dir=self.folder, prefix=".writing-", suffix=".npz")
             try:
-                with os.fdopen(handle, "wb") as file:
+                with os.fdopen(handle, "w+b") as file:
+                    file.write(bytes(_HEAD.size))
                     np.savez(file, **arrays)
+                    head = _HEAD.pack(_MAGIC, *_length_and_sum(file))
+                    file.seek(0)
+                    file.write(head)
                 os.replace(name, path)
             except BaseException:
                 Path(name).unlink(missing_ok=True)
@@ -104,6 +148,85 @@ class StageCache:
             if path != keep:
                 path.unlink(missing_ok=True)
                 total -= size
+
+
+class _EarlierFormatError(CacheEntryError):
+    """An entry of an earlier version of the program, which is no damage."""
+
+
+def _checked_arrays(file: BinaryIO) -> Arrays:
+    """Arrays of an entry whose bytes are those that were written."""
+    head = file.read(_HEAD.size)
+    if head[:4] == b"PK\3\4":
+        raise _EarlierFormatError
+    if len(head) < _HEAD.size or head != _HEAD.pack(_MAGIC, *(found := _length_and_sum(file))):
+        raise CacheEntryError("its check sum is wrong")
+    archive = NpzFile(file, most_bytes=found[0])
+    return {name: archive.array(name) for name in archive.names}
+
+
+def _length_and_sum(file: BinaryIO) -> tuple[int, int]:
+    """Number of bytes after the head, and their check sum."""
+    file.seek(_HEAD.size)
+    n_bytes = total = 0
+    while chunk := file.read(_CHUNK):
+        n_bytes += len(chunk)
+        total = zlib.crc32(chunk, total)
+    return n_bytes, total
+
+
+def require_rows(kept: Arrays, name: str, n_rows: int, n_columns: int) -> None:
+    """Check compressed sparse rows ``name_indptr`` and ``name_indices`` before compiled loops follow them.
+
+    Raises
+    ------
+    CacheEntryError
+        If they are not ``n_rows`` rows of columns 0 to ``n_columns - 1``.
+    """
+    indptr, indices = kept[f"{name}_indptr"], kept[f"{name}_indices"]
+    require_array(indptr, f"{name}_indptr", (n_rows + 1,), np.int32)
+    require_array(indices, f"{name}_indices", (None,), np.int32, (0, n_columns))
+    if indptr[0] != 0 or indptr[-1] != len(indices) or (np.diff(indptr) < 0).any():
+        raise CacheEntryError(f"{name}_indptr does not part {name}_indices into rows")
+
+
+def require_array(
+    array: NDArray,
+    name: str,
+    shape: tuple[int | None, ...],
+    dtype: type[np.generic],
+    span: tuple[int, int] | None = None,
+) -> None:
+    """Check shape, type and values of an array from the cache.
+
+    Parameters
+    ----------
+    array : array
+    name : str
+        What to call it.
+    shape : tuple of int or None
+        None for any number.
+    dtype : type
+        Its type, to the bit.
+    span : (int, int), optional
+        Least value and the first that is too large; without it all must be finite.
+
+    Raises
+    ------
+    CacheEntryError
+        If it is not so.
+    """
+    fits = array.ndim == len(shape) and all(
+        want is None or want == got for want, got in zip(shape, array.shape, strict=True)
+    )
+    if not fits or array.dtype != dtype:
+        raise CacheEntryError(f"{name} has shape {array.shape} and type {array.dtype}")
+    if span is None:
+        is_fine = bool(np.isfinite(array).all())
+    else:
+        is_fine = not array.size or (array.min() >= span[0] and array.max() < span[1])
+    if not is_fine:
+        raise CacheEntryError(f"{name} has values out of range")
 
 
 def default_cache_folder() -> Path:

@@ -150,8 +150,10 @@ def surface_of(
     if near is not None and near.ellipses is ellipses and unmended(near.options) == plain:
         made = near.stages
     else:
-        kept = cache.load(key) if cache is not None else None
-        made = unpacked_stages(kept, options) if kept else plain_stages(ellipses, options, timed, stages)
+        kept = None
+        if cache is not None:
+            kept = cache.load(key, lambda arrays: unpacked_stages(arrays, options, ellipses.n_nodes))
+        made = kept or plain_stages(ellipses, options, timed, stages)
         if cache is not None and kept is None:
             cache.store(key, packed_stages(made))
     if made.options != options:

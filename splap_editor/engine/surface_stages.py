@@ -15,7 +15,7 @@ from splap_editor.core.splats.occupancy import Ellipses
 from splap_editor.core.surface.geodesics import Neighborhoods, geodesic_neighbors, mended_neighborhoods
 from splap_editor.core.surface.laplacian import point_cloud_laplacian
 from splap_editor.core.surface.local_triangulation import local_triangulations, mended_triangulations
-from splap_editor.engine.cache import Arrays
+from splap_editor.engine.cache import Arrays, require_array, require_rows
 from splap_editor.engine.parallel_lock import alone
 
 
@@ -114,16 +114,16 @@ def packed_stages(made: SurfaceStages) -> Arrays:
     """Arrays of unmended stages, for the cache."""
     graph, neighborhoods, L = made.graph, made.neighborhoods, made.L
     arrays = {
-        "graph_indptr": graph.indptr,
-        "graph_indices": graph.indices,
+        "graph_indptr": graph.indptr.astype(np.int32, copy=False),
+        "graph_indices": graph.indices.astype(np.int32, copy=False),
         "graph_lengths": graph.lengths,
         "graph_epsilon": np.array(graph.epsilon),
-        "near_indptr": neighborhoods.indptr,
-        "near_indices": neighborhoods.indices,
+        "near_indptr": neighborhoods.indptr.astype(np.int32, copy=False),
+        "near_indices": neighborhoods.indices.astype(np.int32, copy=False),
         "near_distances": neighborhoods.distances,
         "triangles": made.triangles,
-        "L_indptr": L.indptr,
-        "L_indices": L.indices,
+        "L_indptr": L.indptr.astype(np.int32, copy=False),
+        "L_indices": L.indices.astype(np.int32, copy=False),
         "L_data": L.data,
         "M": made.M,
     }
@@ -132,16 +132,27 @@ def packed_stages(made: SurfaceStages) -> Arrays:
     return arrays
 
 
-def unpacked_stages(kept: Arrays, options: GraphOptions) -> SurfaceStages:
-    """Unmended stages from the cache."""
+def unpacked_stages(kept: Arrays, options: GraphOptions, n_nodes: int) -> SurfaceStages:
+    """Unmended stages from the cache.
+
+    Raises
+    ------
+    CacheEntryError, KeyError
+        If they are not of ``n_nodes`` nodes, or an index is out of range.
+    """
+    for name in ("graph", "near", "L"):
+        require_rows(kept, name, n_nodes, n_nodes)
+    for name, like in (("graph_lengths", "graph_indices"), ("near_distances", "near_indices"), ("L_data", "L_indices")):
+        require_array(kept[name], name, kept[like].shape, np.float64)
+    require_array(kept["graph_epsilon"], "graph_epsilon", (), np.float64)
+    require_array(kept["triangles"], "triangles", (None, 3), np.int32, (0, n_nodes))
+    require_array(kept["M"], "M", (n_nodes,), np.float64)
+    touch = kept.get("graph_touch")
+    if touch is not None:
+        require_array(touch, "graph_touch", kept["graph_indices"].shape, np.float64)
     graph = SplatGraph(
-        kept["graph_indptr"],
-        kept["graph_indices"],
-        kept["graph_lengths"],
-        kept.get("graph_touch"),
-        float(kept["graph_epsilon"]),
+        kept["graph_indptr"], kept["graph_indices"], kept["graph_lengths"], touch, float(kept["graph_epsilon"])
     )
     neighborhoods = Neighborhoods(kept["near_indptr"], kept["near_indices"], kept["near_distances"])
-    n = len(kept["M"])
-    L = sp.csr_array((kept["L_data"], kept["L_indices"], kept["L_indptr"]), shape=(n, n))
+    L = sp.csr_array((kept["L_data"], kept["L_indices"], kept["L_indptr"]), shape=(n_nodes, n_nodes))
     return SurfaceStages(unmended(options), graph, graph, neighborhoods, kept["triangles"], L, kept["M"])

@@ -8,6 +8,12 @@ from typing import Any
 
 Error = Callable[[str], ValueError]
 
+_MOST_DIGITS = 400
+"""Digits of a whole number: more than the largest float has."""
+
+_MOST_VALUES = 4_000_000
+"""Lists and texts in a document, an object counting for four: each takes some 60 bytes of memory."""
+
 
 class JsonObject:
     """One object of a JSON document and where it stands in it.
@@ -32,9 +38,9 @@ class JsonObject:
         self._value = value
         for key in value:
             if key not in keys:
-                near = get_close_matches(str(key), keys, 1)
+                near = get_close_matches(key[:60], keys, 1)
                 hint = f"did you mean {near[0]!r}?" if near else f"the keys are {', '.join(keys)}"
-                raise error(f"{self.at(key)} is not known: {hint}")
+                raise error(f"{self.at(shown(key)[1:-1])} is not known: {hint}")
 
     def __contains__(self, key: str) -> bool:
         return key in self._value
@@ -144,12 +150,22 @@ def parsed_json(data: bytes, error: Error) -> Any:
     def distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         found = dict(pairs)
         if len(found) < len(pairs):
-            keys = [key for key, _ in pairs]
-            raise error(f"the key {next(k for k in keys if keys.count(k) > 1)!r} stands twice: remove one")
+            seen: set[str] = set()
+            for key, _ in pairs:
+                if key in seen:
+                    raise error(f"the key {key[:60]!r} stands twice: remove one")
+                seen.add(key)
         return found
 
+    def whole(digits: str) -> int:
+        if len(digits) > _MOST_DIGITS:
+            raise error(f"it has a whole number of {len(digits):,} digits: {_MOST_DIGITS} are the most")
+        return int(digits)
+
+    if data.count(b"[") + data.count(b'"') // 2 + 4 * data.count(b"{") > _MOST_VALUES:
+        raise error(f"it holds more than {_MOST_VALUES:,} lists, objects and texts")
     try:
-        return json.loads(data.decode("utf-8-sig"), object_pairs_hook=distinct)
+        return json.loads(data.decode("utf-8-sig"), object_pairs_hook=distinct, parse_int=whole)
     except json.JSONDecodeError as problem:
         raise error(f"it is not JSON: {problem.msg} in line {problem.lineno}, column {problem.colno}") from None
     except UnicodeDecodeError:
@@ -173,6 +189,9 @@ def json_lines(value: dict[str, Any]) -> str:
 
 def shown(value: Any) -> str:
     """A value as JSON, cut to a glance."""
+    # Of long lists and texts only the beginning is looked at.
+    if isinstance(value, list | tuple | str):
+        value = value[:60]
     text = json.dumps(value, default=str)
     return text if len(text) <= 60 else text[:57] + "..."
 

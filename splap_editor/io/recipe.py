@@ -19,6 +19,7 @@ from splap_editor.io.recipe_specs import (
     SolverSpec,
     Vector,
 )
+from splap_editor.io.regular_file import regular_bytes
 
 __all__ = [
     "DEFAULT_RADIUS",
@@ -72,7 +73,7 @@ def read_recipe(path: str | os.PathLike[str]) -> Recipe:
     """
     path = Path(path)
     try:
-        data = path.read_bytes()
+        data = regular_bytes(path)
     except OSError as error:
         raise RecipeError(f"{path} cannot be read: {error.strerror or error}. Check the path.") from error
     try:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from splap_editor.io.atomic_file import atomic_file
 from splap_editor.io.json_object import JsonObject, json_lines, parsed_json, shown
 from splap_editor.io.recipe import RecipeError, pose_from_json, pose_to_json, recipe_from_json, recipe_to_json
+from splap_editor.io.regular_file import open_regular, regular_bytes
 from splap_editor.io.session_specs import (
     HandleSettings,
     KeySpec,
@@ -55,7 +56,7 @@ class SessionFileError(ValueError):
 def content_hash(path: str | os.PathLike[str]) -> str:
     """Hash of a file's bytes, ``"blake2b:…"``; the name and date do not count."""
     digest = hashlib.blake2b(digest_size=16)
-    with open(path, "rb") as file:
+    with open_regular(path) as file:
         while chunk := file.read(_HASH_CHUNK):
             digest.update(chunk)
     return f"blake2b:{digest.hexdigest()}"
@@ -71,7 +72,7 @@ def read_session_file(path: str | os.PathLike[str]) -> SessionFile:
     """
     path = Path(path)
     try:
-        data = path.read_bytes()
+        data = regular_bytes(path)
     except OSError as error:
         raise SessionFileError(f"{path} cannot be read: {error.strerror or error}. Check the path.") from error
     try:

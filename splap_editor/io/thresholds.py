@@ -1,15 +1,12 @@
 """SpikingGS thresholds, which its trainer leaves in an .npz beside the PLY."""
 
+import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    import zipfile
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,44 +48,29 @@ def read_thresholds(npz: Path, n_splats: int) -> Thresholds | str:
         A sentence for the user if the archive is damaged, not SpikingGS's, or
         has other rows: the splats can be shown without thresholds.
     """
-    import zipfile
-    import zlib
+    # Only SpikingGS has such a file; reading any other needs no zip reader.
+    from splap_editor.io.npz import NpzError, NpzFile
+    from splap_editor.io.regular_file import open_regular
 
     try:
-        with zipfile.ZipFile(npz) as archive:
-            if "Vth_pdf.npy" not in archive.namelist():
+        with open_regular(npz) as file:
+            # As many numbers as the splats need, and what little more an archive may hold.
+            archive = NpzFile(file, most_bytes=16 * n_splats + 1024)
+            if "Vth_pdf" not in archive.names:
                 return f"{npz.name} beside the file holds no Vth_pdf: it is read without thresholds."
-            # The header is looked at first: a damaged one may promise more rows than the memory holds.
-            n_rows = _n_values(archive, "Vth_pdf")
+            n_rows = math.prod(archive.shape("Vth_pdf"))
             if n_rows != n_splats:
                 return (
                     f"{npz.name} holds {n_rows:,} thresholds for {n_splats:,} splats: it belongs to another save and "
                     "is not used. Put the archive of the same iteration beside the file."
                 )
-            cutoffs = np.abs(_values(archive, "Vth_pdf").astype(np.float32))
+            cutoffs = np.abs(archive.array("Vth_pdf").reshape(-1).astype(np.float32))
             floor = 0.0
-            if "Vth_opa.npy" in archive.namelist() and _n_values(archive, "Vth_opa") == 1:
-                floor = float(_values(archive, "Vth_opa")[0])
-    except (OSError, ValueError, TypeError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
+            if "Vth_opa" in archive.names and math.prod(archive.shape("Vth_opa")) == 1:
+                floor = float(archive.array("Vth_opa").reshape(-1)[0])
+    except (OSError, NpzError, MemoryError) as error:
         return f"{npz.name} beside the file cannot be read ({error}): its thresholds are not used."
     bad = np.flatnonzero(~np.isfinite(cutoffs))
     if len(bad):
         return f"{npz.name} holds {len(bad):,} thresholds that are not finite, first in row {bad[0]:,}: none is used."
     return Thresholds(cutoffs, floor if np.isfinite(floor) else 0.0)
-
-
-def _n_values(archive: "zipfile.ZipFile", key: str) -> int:
-    """Number of values that the header of an array in the archive promises."""
-    with archive.open(key + ".npy") as member:
-        version = np.lib.format.read_magic(member)
-        read_header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-        shape, _, dtype = read_header(member)
-    if dtype.kind not in "fiu":
-        raise ValueError(f"{key} is not numeric")
-    return int(np.prod(shape, dtype=object))
-
-
-def _values(archive: "zipfile.ZipFile", key: str) -> NDArray:
-    """Values of an array in the archive, flat."""
-    with archive.open(key + ".npy") as member:
-        return np.lib.format.read_array(member, allow_pickle=False).reshape(-1)

@@ -15,6 +15,7 @@ from splap_editor.engine.cache import StageCache
 from splap_editor.engine.edit import Edit, Handle, Pose
 from splap_editor.engine.pipeline import deformer_of, handles_of, kernels_of, surface_of
 from splap_editor.engine.recipe_edit import edit_of, recipe_of
+from splap_editor.engine.surface_stages import packed_stages
 from splap_editor.io.ply import read_ply
 from splap_editor.io.recipe import recipe_from_json, recipe_to_json
 from splap_editor.resources import resource
@@ -153,6 +154,64 @@ def test_a_cached_scene_gives_the_same_bits(splats, surface, tmp_path):
     np.testing.assert_array_equal(posed(first, splats, edit).means, posed(second, splats, edit).means)
     other = surface_of(splats, GraphOptions(k=12), cache=cache)
     assert "graph" in other.timings_s
+
+
+def damaged(arrays, name, change):
+    return {**arrays, name: change(arrays[name].copy())}
+
+
+def set_to(value):
+    def change(array):
+        array.reshape(-1)[-1] = value
+        return array
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("graph_indices", set_to(-1)),
+        ("graph_indptr", set_to(1 << 30)),
+        ("near_indices", set_to(1 << 30)),
+        ("near_indptr", lambda a: a[::-1].copy()),
+        ("L_indices", lambda a: a[:-1]),
+        ("L_data", set_to(np.nan)),
+        ("triangles", set_to(1 << 20)),
+        ("triangles", lambda a: a.reshape(-1)),
+        ("M", lambda a: a[:-1]),
+        ("M", lambda a: a.astype(np.float32)),
+        ("graph_touch", lambda a: a[:-1]),
+        ("graph_epsilon", lambda a: np.array([0.0])),
+    ],
+)
+def test_stages_with_an_index_out_of_range_are_made_again(splats, surface, tmp_path, name, change):
+    said = []
+    cache = StageCache(tmp_path, say=said.append)
+    surface_of(splats, GraphOptions(), cache=cache)
+    key = next(tmp_path.iterdir()).stem
+    cache.store(key, damaged(packed_stages(surface.stages), name, change))
+    again = surface_of(splats, GraphOptions(), cache=cache)
+    assert "graph" in again.timings_s and len(said) == 1
+    np.testing.assert_array_equal(again.triangles, surface.triangles)
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [("weights_indices", set_to(9)), ("weights_data", lambda a: a[1:]), ("qp", set_to(np.nan)), ("counts", set_to)],
+)
+def test_weights_that_do_not_fit_are_solved_again(splats, surface, tmp_path, name, change):
+    said = []
+    cache = StageCache(tmp_path, say=said.append)
+    edit = end_edit(splats, method="bbw")
+    handles = handles_of(surface, edit)
+    first = deformer_of(surface, edit, handles, cache=cache, progress=no_progress)
+    key = next(tmp_path.iterdir()).stem
+    kept = cache.load(key, dict)
+    cache.store(key, {n: a for n, a in kept.items() if n != name} if change is set_to else damaged(kept, name, change))
+    second = deformer_of(surface, edit, handles, cache=cache, progress=no_progress)
+    assert len(said) == 1
+    np.testing.assert_array_equal(first.weights, second.weights)
 
 
 def test_bbw_weights_are_kept_between_runs(splats, surface, tmp_path):

@@ -195,7 +195,7 @@ def test_a_file_that_is_no_recipe_is_refused_by_its_name(data, message, tmp_path
 def test_paths_that_cannot_be_read_or_written_are_refused(tmp_path):
     with pytest.raises(RecipeError, match="cannot be read: No such file"):
         read_recipe(tmp_path / "missing.json")
-    with pytest.raises(RecipeError, match="cannot be read: Is a directory"):
+    with pytest.raises(RecipeError, match="cannot be read: it is a directory"):
         read_recipe(tmp_path)
     with pytest.raises(RecipeError, match="cannot be written"):
         write_recipe(tmp_path / "no" / "edit.json", Recipe())

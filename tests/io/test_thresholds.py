@@ -107,8 +107,8 @@ def test_a_cut_archive_is_a_warning(ply):
     [
         ({"xyz": np.zeros(3)}, "holds no Vth_pdf"),
         ({"Vth_pdf": np.full(N, np.nan)}, "12 thresholds that are not finite, first in row 0"),
-        ({"Vth_pdf": np.array(["a"] * N)}, "not numeric"),
-        ({"Vth_pdf": np.array([None] * N, object)}, "not numeric"),
+        ({"Vth_pdf": np.array(["a"] * N)}, "no array of plain numbers"),
+        ({"Vth_pdf": np.array([None] * N, object)}, "no array of plain numbers"),
     ],
 )
 def test_an_archive_of_something_else_is_a_warning(arrays, message, ply):
