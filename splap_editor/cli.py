@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import splap_editor
+from splap_editor.core.graph.options import EDGE_OPTIONS, GraphOptions
+from splap_editor.core.options import options_of
 from splap_editor.stage_report import StageReport
 
 EXIT_OK, EXIT_REFUSED = 0, 2
@@ -85,8 +87,7 @@ def _parser() -> argparse.ArgumentParser:
     graph = commands.add_parser("graph", help="write the splat graph as a PLY with vertices and edges")
     _add_input(graph)
     graph.add_argument("-o", "--output", required=True, type=Path, metavar="EDGES.ply")
-    graph.add_argument("--rule", choices=("touch", "paper"), default="touch", help="how edges are chosen")
-    graph.add_argument("--epsilon", type=float, default=0.005, help="gap that still counts as touching, of the size")
+    _add_options(graph, GraphOptions, EDGE_OPTIONS)
     _add_output(graph)
     graph.set_defaults(run=_graph)
     return parser
@@ -105,6 +106,19 @@ def _add_edit(parser: argparse.ArgumentParser, *, required: bool) -> None:
 
 def _add_frames(parser: argparse.ArgumentParser, text: str) -> None:
     parser.add_argument("--frames", nargs="?", const="", metavar="A-B", help=f"{text}; all of them by default")
+
+
+def _add_options(parser: argparse.ArgumentParser, group: type, names: Sequence[str]) -> None:
+    """Flags for some options of a group; lists of rows are for recipes."""
+    for name, known in options_of(group).items():
+        if name in names and known.kind != "pairs":
+            parser.add_argument(
+                f"--{name.replace('_', '-')}",
+                type=type(known.default),
+                choices=known.choices and tuple(known.choices),
+                default=known.default,
+                help=f"{known.sentence[0].lower()}{known.sentence[1:].rstrip('.')}; default {known.default}",
+            )
 
 
 def _size(text: str) -> tuple[int, int]:
@@ -206,7 +220,6 @@ def _info(options: argparse.Namespace) -> int:
     with report("occupancy"):
         info, ellipses = scene_info(file)
     if options.graph:
-        from splap_editor.core.graph.splat_graph import GraphOptions
         from splap_editor.engine.pipeline import surface_of
 
         surface = surface_of(file.splats, GraphOptions(), ellipses=ellipses, stages=report.stage)
@@ -222,7 +235,7 @@ def _graph(options: argparse.Namespace) -> int:
     import numpy as np
 
     from splap_editor.core.graph.ellipse_offset import normal_offsets
-    from splap_editor.core.graph.splat_graph import GraphOptions, splat_graph
+    from splap_editor.core.graph.splat_graph import splat_graph
     from splap_editor.core.splats.occupancy import occupancy_ellipses
     from splap_editor.engine.scene_info import graph_info
     from splap_editor.io.edges_ply import write_edges_ply
@@ -234,9 +247,8 @@ def _graph(options: argparse.Namespace) -> int:
     with report("occupancy"):
         ellipses = occupancy_ellipses(file.splats)
     with report("graph"):
-        graph = splat_graph(
-            ellipses, GraphOptions(rule=options.rule, epsilon=options.epsilon), progress=report.progress
-        )
+        wanted = GraphOptions(**{name: value for name, value in vars(options).items() if name in EDGE_OPTIONS})
+        graph = splat_graph(ellipses, wanted, progress=report.progress)
     with report("offsets"):
         offsets = normal_offsets(ellipses, graph.edges).min(axis=1)
     with report("write"):

@@ -1,21 +1,18 @@
 """Recipes on disk and edits in memory, each made from the other."""
 
-from dataclasses import asdict
-
 import numpy as np
 
-from splap_editor.core.graph.splat_graph import GraphOptions
 from splap_editor.core.handle_nodes import Region
 from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.edit import HANDLE_COLORS, Edit, Handle, Pose
-from splap_editor.io.recipe import GraphSpec, HandleSpec, PinSpec, Recipe, RecipeError
+from splap_editor.io.recipe import HandleSpec, PinSpec, Recipe, RecipeError
 
 
 def recipe_of(edit: Edit, *, with_disabled: bool = False) -> Recipe:
     """Write an edit as a recipe; disabled handles are left out unless wanted, since they do nothing."""
     return Recipe(
         method=edit.method,
-        graph=GraphSpec(**asdict(edit.graph)),
+        graph=edit.graph,
         free_radius=edit.free_radius,
         handles=tuple(_handle_spec(handle) for handle in (edit.handles if with_disabled else edit.active_handles)),
         pins=tuple(PinSpec(*_place(pin)) for pin in edit.pins),
@@ -51,7 +48,7 @@ def edit_of(recipe: Recipe, splats: Splats) -> Edit:
         handles=handles,
         pins=tuple(_region(spec, splats, f"pin {number}") for number, spec in enumerate(recipe.pins, start=1)),
         method=recipe.method,
-        graph=GraphOptions(**asdict(recipe.graph)),
+        graph=recipe.graph,
         free_radius=recipe.free_radius,
         solver=recipe.solver,
         adaptation=recipe.adaptation,

@@ -9,10 +9,12 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from splap_editor.core.graph.splat_graph import GraphOptions, SplatGraph, mended_graph, splat_graph
+from splap_editor.core.graph.options import NEIGHBORHOODS, GraphOptions
+from splap_editor.core.graph.splat_graph import SplatGraph, mended_graph, splat_graph
+from splap_editor.core.options import loaded
 from splap_editor.core.progress import Progress
 from splap_editor.core.splats.occupancy import Ellipses
-from splap_editor.core.surface.geodesics import Neighborhoods, geodesic_neighbors, mended_neighborhoods
+from splap_editor.core.surface.geodesics import Neighborhoods
 from splap_editor.core.surface.laplacian import point_cloud_laplacian
 from splap_editor.core.surface.local_triangulation import local_triangulations, mended_triangulations
 from splap_editor.engine.cache import Arrays, require_array, require_rows
@@ -71,10 +73,11 @@ def plain_stages(ellipses: Ellipses, options: GraphOptions, timed: Timed, stages
     with timed("graph"), alone(stages("graph")):
         graph = splat_graph(ellipses, options, progress=stages("graph"))
     with timed("geodesics"), alone(stages("geodesics")):
-        neighborhoods = geodesic_neighbors(graph, options.k, progress=stages("geodesics"))
+        neighbors = NEIGHBORHOODS[options.neighborhood].load()
+        neighborhoods = neighbors(ellipses, graph, options.k, stages("geodesics"))
     with timed("laplacian"):
         triangles = local_triangulations(ellipses, neighborhoods, progress=stages("laplacian"))
-        L, M = point_cloud_laplacian(ellipses.centers, triangles, graph=graph)
+        L, M = point_cloud_laplacian(ellipses.centers, triangles, graph=graph, method=options.laplacian)
     return SurfaceStages(options, graph, graph, neighborhoods, triangles, L, M)
 
 
@@ -92,11 +95,16 @@ def mended_stages(
         progress(0.2)
         ends = _changed_ends(ellipses, before.options, options)
         with alone(progress):
-            neighborhoods, nodes = mended_neighborhoods(graph, before.neighborhoods, ends, options.k)
-        triangles = mended_triangulations(ellipses, neighborhoods, before.triangles, nodes)
+            row = NEIGHBORHOODS[options.neighborhood]
+            if row.mended:
+                neighborhoods, nodes = loaded(row.mended)(graph, before.neighborhoods, ends, options.k)
+                triangles = mended_triangulations(ellipses, neighborhoods, before.triangles, nodes)
+            else:
+                neighborhoods = row.load()(ellipses, graph, options.k, progress)
+                triangles = local_triangulations(ellipses, neighborhoods)
         progress(0.5)
     with timed("laplacian"):
-        L, M = point_cloud_laplacian(ellipses.centers, triangles, graph=graph)
+        L, M = point_cloud_laplacian(ellipses.centers, triangles, graph=graph, method=options.laplacian)
     return SurfaceStages(options, before.unmended, graph, neighborhoods, triangles, L, M)
 
 

@@ -4,9 +4,12 @@ import json
 import math
 from collections.abc import Callable, Iterator
 from difflib import get_close_matches
-from typing import Any
+from typing import Any, TypeVar
+
+from splap_editor.core.options import Option, options_of
 
 Error = Callable[[str], ValueError]
+Group = TypeVar("Group")
 
 _MOST_DIGITS = 400
 """Digits of a whole number: more than the largest float has."""
@@ -101,6 +104,18 @@ class JsonObject:
         if len(numbers) != size or None in numbers:
             raise self.refuse(key, f"a list of {size} finite numbers")
         return tuple(numbers)
+
+    def options(self, group: type[Group]) -> Group:
+        """An option group, each option under its name; a missing one takes its default."""
+        return group(**{name: self._option(name, known) for name, known in options_of(group).items() if name in self})
+
+    def _option(self, key: str, known: Option) -> Any:
+        if known.kind == "pairs":
+            return self.row_pairs(key)
+        value = self._value[key]
+        if not known.accepts(value):
+            raise self.refuse(key, known.wanted)
+        return float(value) if known.kind in ("number", "length") and value is not None else value
 
     def rows(self, key: str) -> tuple[int, ...]:
         """A list of file rows with at least one in it."""

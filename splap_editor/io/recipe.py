@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from splap_editor.core.graph.options import GraphOptions
+from splap_editor.core.options import options_of
 from splap_editor.io.atomic_file import atomic_file
 from splap_editor.io.json_object import JsonObject, json_lines, parsed_json, shown
 from splap_editor.io.recipe_specs import (
     DEFAULT_RADIUS,
-    GraphSpec,
     HandleSpec,
     PinSpec,
     PoseSpec,
@@ -23,7 +24,6 @@ from splap_editor.io.regular_file import regular_bytes
 
 __all__ = [
     "DEFAULT_RADIUS",
-    "GraphSpec",
     "HandleSpec",
     "PinSpec",
     "PoseSpec",
@@ -54,7 +54,6 @@ _RECIPE_KEYS = (
 )
 _REGION_KEYS = ("center", "radius", "rows")
 _HANDLE_KEYS = ("name", *_REGION_KEYS, "translate", "rotate", "scale", "cage_radius")
-_GRAPH_KEYS = ("rule", "epsilon", "k", "cut", "add")
 _SOLVER_KEYS = ("kind", "tolerance", "iterations", "smoothness")
 
 
@@ -123,7 +122,7 @@ def recipe_from_json(value: Any) -> Recipe:
         free_radius = recipe.number("free_radius", above=0) if "free_radius" in recipe else DEFAULT_RADIUS
     return Recipe(
         method=recipe.choice("method", ("arap", "bbw"), Recipe.method),
-        graph=_graph(recipe.object("graph", _GRAPH_KEYS)),
+        graph=recipe.object("graph", tuple(options_of(GraphOptions))).options(GraphOptions),
         free_radius=free_radius,
         handles=tuple(_handle(h, i) for i, h in enumerate(recipe.objects("handles", _HANDLE_KEYS))),
         pins=tuple(PinSpec(*_region(pin)) for pin in recipe.objects("pins", _REGION_KEYS)),
@@ -131,16 +130,6 @@ def recipe_from_json(value: Any) -> Recipe:
         adaptation=recipe.choice("adaptation", ("surface", "affine", "none"), Recipe.adaptation),
         hops=recipe.integer("hops", Recipe.hops, low=1, high=3),
         blending=recipe.choice("blending", ("dual-quaternion", "linear"), Recipe.blending),
-    )
-
-
-def _graph(graph: JsonObject) -> GraphSpec:
-    return GraphSpec(
-        rule=graph.choice("rule", ("touch", "paper"), GraphSpec.rule),
-        epsilon=graph.number("epsilon", GraphSpec.epsilon, above=0, least=True),
-        k=graph.integer("k", GraphSpec.k, low=3, high=1000),
-        cut=graph.row_pairs("cut"),
-        add=graph.row_pairs("add"),
     )
 
 
@@ -215,7 +204,7 @@ def _scale(handle: JsonObject) -> float | Vector:
 def recipe_to_json(recipe: Recipe) -> dict[str, Any]:
     """Plain objects of a recipe for ``json``; what is left at its default is left out."""
     value: dict[str, Any] = {"version": VERSION, "method": recipe.method}
-    graph = _without_defaults(recipe.graph, GraphSpec())
+    graph = _without_defaults(recipe.graph, GraphOptions())
     if graph:
         value["graph"] = graph
     if not _is_default(recipe.free_radius):

@@ -7,22 +7,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from splap_editor.core.graph.options import GraphOptions
+
 DEFAULT_RADIUS = math.nan
 """Stands for a radius that the recipe leaves to the program; always this very object, so that recipes compare."""
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
-
-
-@dataclass(frozen=True)
-class GraphSpec:
-    """What makes two splats neighbours: the fields of `splap_editor.core.graph.splat_graph.GraphOptions`."""
-
-    rule: Literal["touch", "paper"] = "touch"
-    epsilon: float = 0.005
-    k: int = 30
-    cut: tuple[tuple[int, int], ...] = ()
-    add: tuple[tuple[int, int], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -167,7 +158,7 @@ class Recipe:
     ----------
     method : str
         ``"arap"`` or ``"bbw"``.
-    graph : GraphSpec
+    graph : GraphOptions
     free_radius : float, optional
         World units; splats farther than this from every handle stay put. None
         frees everything not pinned, `DEFAULT_RADIUS` is half the scene scale.
@@ -183,7 +174,7 @@ class Recipe:
     """
 
     method: Literal["arap", "bbw"] = "arap"
-    graph: GraphSpec = field(default_factory=GraphSpec)
+    graph: GraphOptions = field(default_factory=GraphOptions)
     free_radius: float | None = DEFAULT_RADIUS
     handles: tuple[HandleSpec, ...] = ()
     pins: tuple[PinSpec, ...] = ()

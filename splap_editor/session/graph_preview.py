@@ -1,8 +1,7 @@
 """The graph as it would be with other options, made in the background."""
 
-from dataclasses import replace
-
-from splap_editor.core.graph.splat_graph import GraphOptions, SplatGraph, splat_graph
+from splap_editor.core.graph.options import GraphOptions, edges_only
+from splap_editor.core.graph.splat_graph import SplatGraph, splat_graph
 from splap_editor.engine.parallel_lock import alone
 from splap_editor.session.jobs import REPORT_SECONDS, Job
 from splap_editor.session.latest_job import LatestJob
@@ -37,14 +36,14 @@ class GraphPreview:
         return self.wanted is not None and self.graph is None and not self.error
 
     def ask(self, options: GraphOptions) -> None:
-        """Want the graph with these options; the number of geodesic neighbours does not matter."""
+        """Want the graph with these options; those of what is made from it do not matter."""
         scene = self._session.scene
-        options = replace(options, k=GraphOptions.k)
+        options = edges_only(options)
         if scene is None or (options == self.wanted and not self.error):
             return
         self.wanted, self.graph, self.share, self.error = options, None, 0.0, ""
         surface, ellipses, deliver = scene.surface, scene.ellipses, self._take_share
-        if surface is not None and replace(surface.options, k=GraphOptions.k) == options:
+        if surface is not None and edges_only(surface.options) == options:
             self._job.drop()
             self._take(options, surface.graph)
             return

@@ -6,9 +6,9 @@ import math
 import numpy as np
 import pytest
 
+from splap_editor.core.graph.options import GraphOptions
 from splap_editor.io.recipe import (
     DEFAULT_RADIUS,
-    GraphSpec,
     HandleSpec,
     PinSpec,
     Recipe,
@@ -57,7 +57,7 @@ def random_recipe(seed):
             for _ in range(rng.integers(4))
         ),
         pins=tuple(PinSpec(**region(False)) for _ in range(rng.integers(4))),
-        graph=GraphSpec(**maybe(rule="paper", epsilon=0.1 / 3, k=20, cut=pairs, add=pairs)),
+        graph=GraphOptions(**maybe(rule="paper", epsilon=0.1 / 3, k=20, cut=pairs, add=pairs)),
         solver=SolverSpec(**maybe(kind="local-global", tolerance=1e-5 / 3, iterations=3, smoothness=0.0)),
         free_radius=radius(),
         **maybe(method="bbw", adaptation="affine", hops=3, blending="linear"),
@@ -78,7 +78,7 @@ def test_a_recipe_comes_back_exactly(seed, tmp_path):
 def test_what_is_left_out_takes_its_default():
     recipe = recipe_from_json({"version": 1, "handles": [BALL]})
     assert recipe == Recipe(handles=(HandleSpec("handle 1", (0, 0, 0), 1),))
-    assert recipe.graph == GraphSpec("touch", 0.005, 30)
+    assert recipe.graph == GraphOptions("touch", 0.005, 30)
     assert recipe.solver == SolverSpec("converged", 1e-4, 10, 0.001)
     assert math.isnan(recipe.free_radius)
     assert math.isnan(recipe.handles[0].cage_radius)

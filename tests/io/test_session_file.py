@@ -6,7 +6,8 @@ import random
 import numpy as np
 import pytest
 
-from splap_editor.io.recipe import GraphSpec, HandleSpec, PinSpec, PoseSpec, Recipe
+from splap_editor.core.graph.options import GraphOptions
+from splap_editor.io.recipe import HandleSpec, PinSpec, PoseSpec, Recipe
 from splap_editor.io.session_file import (
     SessionFileError,
     content_hash,
@@ -29,7 +30,7 @@ def full_session(n=1003) -> SessionFile:
         PlySpec("../captures/bänk.ply", "blake2b:00ff", n, "pgsr"),
         Recipe(
             method="bbw",
-            graph=GraphSpec(cut=((1, 2),), add=((7, 3),)),
+            graph=GraphOptions(cut=((1, 2),), add=((7, 3),)),
             handles=(
                 HandleSpec("arm", (0.1, 0.2, 0.3), 0.25, translate=(1e-300, 2.0, 3.0)),
                 HandleSpec("leg", (1.0, 2.0, 3.0), rows=(4, 9, 1002), rotate=(0.0, 1.0, 0.0, 0.0), scale=1.5),

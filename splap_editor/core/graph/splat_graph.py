@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 import scipy.sparse as sp
@@ -10,45 +9,15 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from splap_editor.core.graph.ellipse_offset import touch_scales
-from splap_editor.core.graph.ellipse_tree import EllipseTree, ellipse_tree, offset_pairs
-from splap_editor.core.graph.touch_rule import edge_keys, labels_by_size, touch_edges
+from splap_editor.core.graph.ellipse_tree import ellipse_tree
+from splap_editor.core.graph.options import GRAPH_RULES, GraphOptions
+from splap_editor.core.graph.touch_rule import edge_keys, labels_by_size
 from splap_editor.core.progress import Progress, no_progress
 from splap_editor.core.splats.occupancy import Ellipses
 
+__all__ = ["GraphOptions", "SplatGraph", "mended_graph", "require_mendable", "splat_graph"]
+
 _LENGTH_FLOOR = 1e-9
-
-
-@dataclass(frozen=True)
-class GraphOptions:
-    """What makes two splats neighbours.
-
-    Parameters
-    ----------
-    rule : "touch" or "paper"
-        ``touch`` (default): each splat's best contacts, as far as they are
-        mutual, and the best contacts between what that leaves apart.
-        ``paper``: every pair with a normal-wise offset of at most ε.
-    epsilon : float
-        Tolerance along the normals in units of the scene scale.
-    k : int
-        Number of geodesic neighbours the Laplacian is built from.
-    cut, add : tuple of (int, int)
-        Edges taken out of and put into the finished graph, as pairs of file rows.
-    """
-
-    rule: Literal["touch", "paper"] = "touch"
-    epsilon: float = 0.005
-    k: int = 30
-    cut: tuple[tuple[int, int], ...] = ()
-    add: tuple[tuple[int, int], ...] = ()
-
-    def __post_init__(self):
-        if self.rule not in ("touch", "paper"):
-            raise ValueError(f'rule must be "touch" or "paper", got {self.rule!r}')
-        if not (np.isfinite(self.epsilon) and self.epsilon >= 0.0):
-            raise ValueError(f"epsilon must be a finite number, not negative, got {self.epsilon}")
-        if self.k < 3:
-            raise ValueError(f"k must be at least 3, got {self.k}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,10 +116,7 @@ def splat_graph(
     cut = _node_pairs(ellipses, options.cut, "cut")
     add = _node_pairs(ellipses, options.add, "add")
     tree = ellipse_tree(ellipses)
-    if options.rule == "paper":
-        edges, touch = _offset_edges(tree, epsilon, progress), None
-    else:
-        edges, touch = touch_edges(tree, epsilon, progress)
+    edges, touch = GRAPH_RULES[options.rule].load()(tree, epsilon, progress)
     graph = _symmetric(ellipses, *_mended(ellipses, edges, touch, epsilon, cut, add), epsilon)
     progress(1.0)
     return graph
@@ -203,21 +169,6 @@ def _mended(
         kept = ~np.isin(edge_keys(edges, ellipses.n_nodes), edge_keys(cut, ellipses.n_nodes))
         edges, touch = edges[kept], None if touch is None else touch[kept]
     return edges, touch
-
-
-def _offset_edges(tree: EllipseTree, epsilon: float, progress: Progress) -> NDArray[np.int32]:
-    """(E, 2) edges of the paper's rule."""
-    buffer = np.empty((1 << 18, 2), np.int32)
-    chunks, start, n = [np.empty((0, 2), np.int32)], 0, len(tree.nodes)
-    while start < n:
-        end, count = offset_pairs(start, *tree.arrays, epsilon, buffer)
-        if end == start:
-            buffer = np.empty((2 * len(buffer), 2), np.int32)
-            continue
-        chunks.append(buffer[:count].copy())
-        start = end
-        progress(0.9 * start / n)
-    return np.concatenate(chunks)
 
 
 def _node_pairs(ellipses: Ellipses, rows: tuple[tuple[int, int], ...], name: str) -> NDArray[np.int32]:

@@ -1,13 +1,12 @@
 """The Laplacian and mass matrix of a splat scene."""
 
-from typing import Literal
-
 import numpy as np
 import robust_laplacian
 import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
 
+from splap_editor.core.graph.options import LAPLACIANS
 from splap_editor.core.graph.splat_graph import SplatGraph
 
 BRIDGE_WEIGHT = 0.5
@@ -22,7 +21,7 @@ def point_cloud_laplacian(
     triangles: NDArray[np.integer],
     *,
     graph: SplatGraph | None = None,
-    method: Literal["stars", "robust"] = "stars",
+    method: str = "stars",
 ) -> tuple[sp.csr_array, NDArray[np.float64]]:
     """Cotangent Laplacian and lumped mass from the union of local Delaunay stars.
 
@@ -44,7 +43,8 @@ def point_cloud_laplacian(
         Union of all stars, see `local_triangulations`.
     graph : SplatGraph, optional
         The graph the stars come from; without it parts stay apart.
-    method : "stars" or "robust"
+    method : str
+        One of `LAPLACIANS`.
         How the union becomes a Laplacian.
 
     Returns
@@ -71,17 +71,17 @@ def point_cloud_laplacian(
         raise ValueError(f"centers must have shape (n, 3), got {centers.shape}")
     if triangles.ndim != 2 or triangles.shape[1] != 3:
         raise ValueError(f"triangles must have shape (T, 3), got {triangles.shape}")
-    if method not in ("stars", "robust"):
-        raise ValueError(f'method must be "stars" or "robust", got {method!r}')
+    if method not in LAPLACIANS:
+        raise ValueError(f"method must be one of {', '.join(LAPLACIANS)}, got {method!r}")
     if graph is not None and graph.n_nodes != len(centers):
         raise ValueError(f"graph must have {len(centers)} nodes, got {graph.n_nodes}")
-    weights, masses = (_star_weights if method == "stars" else _robust_weights)(centers, triangles)
+    weights, masses = LAPLACIANS[method].load()(centers, triangles)
     if graph is not None:
         weights = weights + _bridges(weights, graph)
     return _laplacian_of(weights), _floored(masses, graph)
 
 
-def _star_weights(
+def star_weights(
     centers: NDArray[np.float64], triangles: NDArray[np.integer]
 ) -> tuple[sp.csr_array, NDArray[np.float64]]:
     """(n, n) symmetric weights, not negative, and (n,) masses by summing cotangents."""
@@ -104,7 +104,7 @@ def _star_weights(
     return (upper + upper.T).tocsr(), masses
 
 
-def _robust_weights(
+def robust_weights(
     centers: NDArray[np.float64], triangles: NDArray[np.integer]
 ) -> tuple[sp.csr_array, NDArray[np.float64]]:
     """(n, n) symmetric weights, not negative, and (n,) masses by Sharp and Crane's method."""

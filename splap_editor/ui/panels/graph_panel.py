@@ -1,6 +1,6 @@
 """The splat graph: edges in view, its options with a preview, components, mends."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from PySide6.QtCore import Qt, Signal
@@ -17,7 +17,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from splap_editor.core.graph.splat_graph import GraphOptions, SplatGraph
+from splap_editor.core.graph.options import GraphOptions, edges_only
+from splap_editor.core.graph.splat_graph import SplatGraph
 from splap_editor.session.graph_preview import GraphPreview
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
@@ -35,31 +36,6 @@ VIEW_HINTS = {
         "Steps", "How far from the selection edges are drawn.", low=1, high=50, only_for=("shown", ("near",))
     ),
     "color": FieldHint("Colour by", "What the colour of an edge says.", choices=EDGE_COLORS),
-}
-
-
-@dataclass(frozen=True)
-class RuleOptions:
-    """The part of `GraphOptions` that the form edits; ε in percent."""
-
-    rule: str
-    epsilon: float
-    k: int
-
-
-RULE_HINTS = {
-    "rule": FieldHint(
-        "Rule", "How neighbours are chosen.", choices={"touch": "Best contacts", "paper": "All within the gap"}
-    ),
-    "epsilon": FieldHint(
-        "Gap ε",
-        "Gap that still counts as touching, in percent of the size.",
-        unit="%",
-        high=20.0,
-        step=0.05,
-        decimals=3,
-    ),
-    "k": FieldHint("Neighbours k", "Nearest along the surface that the Laplacian is made of.", low=3, high=500),
 }
 
 
@@ -82,14 +58,14 @@ class GraphPanel(QWidget):
         self._view = view
         self._preview = preview
         self._commands = commands
-        self._wanted: RuleOptions | None = None
+        self._wanted: GraphOptions | None = None
         self._listed: SplatGraph | None = None
         self._segments = QHBoxLayout()
         self._segments.setSpacing(0)
         self.form = OptionsForm(view.options, VIEW_HINTS)
         self.form.changed.connect(lambda options: view.set(hops=options.hops, color=options.color))
         self.counts = _label()
-        self.rule = OptionsForm(RuleOptions("touch", 0.5, 30), RULE_HINTS)
+        self.rule = OptionsForm(GraphOptions())
         self.rule.changed.connect(self._on_rule_changed)
         self.estimate = _label()
         self.apply = QPushButton("Apply")
@@ -147,9 +123,9 @@ class GraphPanel(QWidget):
     def _show(self) -> None:
         scene = self._session.scene
         self.setEnabled(scene is not None)
-        if scene is not None and self._wanted in (None, _rule_options(scene.edit.graph)):
+        if scene is not None and self._wanted in (None, scene.edit.graph):
             self._wanted = None
-            self.rule.show_value(_rule_options(scene.edit.graph))
+            self.rule.show_value(scene.edit.graph)
         self._show_view()
         self._show_estimate()
         self._show_components()
@@ -178,7 +154,7 @@ class GraphPanel(QWidget):
         text, tone = "Counting edges …", "quiet"
         if preview.error:
             text, tone = preview.error, "danger"
-        elif preview.graph is not None and preview.wanted == self._wanted_options(k=GraphOptions.k):
+        elif preview.graph is not None and preview.wanted == edges_only(self._wanted_options()):
             n, pieces = preview.graph.n_edges, int(preview.graph.components.max(initial=-1)) + 1
             change = n - self._graph.n_edges if self._graph is not None else 0
             text = f"{n:,} edges ({change:+,}), {_pieces(pieces)}"
@@ -219,15 +195,15 @@ class GraphPanel(QWidget):
 
     # Changing the rule --------------------------------------------------------------------------------------------
 
-    def _wanted_options(self, **changes: object) -> GraphOptions:
-        wanted = self._wanted
-        options = replace(self._session.scene.edit.graph, rule=wanted.rule, epsilon=wanted.epsilon / 100.0, k=wanted.k)
-        return replace(options, **changes)
+    def _wanted_options(self) -> GraphOptions:
+        """What Apply would put in force: mends made meanwhile stay."""
+        held = self._session.scene.edit.graph
+        return replace(self._wanted, cut=held.cut, add=held.add)
 
-    def _on_rule_changed(self, wanted: RuleOptions) -> None:
+    def _on_rule_changed(self, wanted: GraphOptions) -> None:
         if self._session.scene is None:
             return
-        self._wanted = wanted if wanted != _rule_options(self._session.scene.edit.graph) else None
+        self._wanted = wanted if wanted != self._session.scene.edit.graph else None
         if self._wanted is not None:
             self._preview.ask(self._wanted_options())
         self._show_estimate()
@@ -240,10 +216,6 @@ class GraphPanel(QWidget):
         self._wanted = None
         self._preview.clear()
         self._show()
-
-
-def _rule_options(options: GraphOptions) -> RuleOptions:
-    return RuleOptions(options.rule, round(100.0 * options.epsilon, 6), options.k)
 
 
 def _pieces(n: int) -> str:

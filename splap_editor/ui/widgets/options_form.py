@@ -7,6 +7,7 @@ from typing import Any
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QCheckBox, QComboBox, QGridLayout, QLabel, QWidget
 
+from splap_editor.core.options import Option, options_of
 from splap_editor.ui.theme import STEP
 from splap_editor.ui.widgets.number_field import NumberField
 
@@ -27,6 +28,8 @@ class FieldHint:
         Digits after the point of a float.
     choices : dict
         Values of a choice with the words for them; empty for numbers and switches.
+    factor : float
+        A number is shown so many times its value, as 100 for percent.
     only_for : (str, tuple), optional
         Name and values of another field without which this one means nothing.
     """
@@ -39,19 +42,50 @@ class FieldHint:
     step: float = 1.0
     decimals: int = 3
     choices: Mapping[Any, str] | None = None
+    factor: float = 1.0
     only_for: tuple[str, tuple] | None = None
+
+
+_WIDEST = 1e9
+"""Bound of a number that has none of its own."""
+
+
+def hints_of(group: Any) -> dict[str, FieldHint]:
+    """Hints for the options of a group, or of its class, that a form can show."""
+    return {name: _hint(known) for name, known in options_of(group).items() if known.kind not in ("pairs", "length")}
+
+
+def _hint(known: Option) -> FieldHint:
+    factor = 100.0 if known.is_percent else 1.0
+    decimals = known.decimals - 2 if known.is_percent else known.decimals
+    # A field has no open end: the least number above the bound that it can show.
+    low = known.above + 10.0**-known.decimals if known.above > known.least else known.least
+    return FieldHint(
+        known.label,
+        known.sentence,
+        "%" if known.is_percent else "",
+        factor * max(low, -_WIDEST),
+        min(factor * known.most, _WIDEST),
+        factor * known.step,
+        decimals,
+        None if known.choices is None else {name: choice.label for name, choice in known.choices.items()},
+        factor,
+        known.only_for,
+    )
 
 
 class OptionsForm(QWidget):
     """Edits a frozen dataclass; each finished entry gives a new value.
 
-    Fields come in their order in the class; one without a hint is not shown.
+    Fields come in their order in the class; one without a hint is not shown. Hints are made of the options of the class
+    unless given.
     """
 
     changed = Signal(object)
 
-    def __init__(self, value: Any, hints: Mapping[str, FieldHint], parent: QWidget | None = None) -> None:
+    def __init__(self, value: Any, hints: Mapping[str, FieldHint] | None = None, parent: QWidget | None = None) -> None:
         super().__init__(parent)
+        hints = hints_of(value) if hints is None else hints
         self._value = value
         self._hints = {field.name: hints[field.name] for field in fields(value) if field.name in hints}
         self._editors: dict[str, QWidget] = {}
@@ -86,7 +120,7 @@ class OptionsForm(QWidget):
             elif isinstance(editor, QComboBox):
                 editor.setCurrentIndex(max(editor.findData(held), 0))
             else:
-                editor.show_value(held)
+                editor.show_value(self._hints[name].factor * held)
             editor.blockSignals(False)
             only_for = self._hints[name].only_for
             is_meant = only_for is None or getattr(value, only_for[0]) in only_for[1]
@@ -112,13 +146,18 @@ class OptionsForm(QWidget):
             kind = type(value)
             decimals = 0 if kind is int else hint.decimals
             editor = NumberField(hint.low, hint.high, decimals=decimals, step=hint.step, unit=hint.unit)
-            editor.committed.connect(lambda number: self._take(name, kind(number)))
+            editor.committed.connect(lambda number: self._take(name, kind(_round(number / hint.factor))))
         return editor
 
     def _take(self, name: str, held: Any) -> None:
         if getattr(self._value, name) != held:
             self.show_value(replace(self._value, **{name: held}))
             self.changed.emit(self._value)
+
+
+def _round(number: float) -> float:
+    """Number without the last digits, which a factor has changed."""
+    return float(f"{number:.12g}")
 
 
 def form_label(text: str, buddy: QWidget) -> QLabel:

@@ -213,7 +213,7 @@ def test_mended_edges_are_pairs_of_file_rows():
         ({"cut": ((4, 4),)}, "cut: row 4 is paired with itself"),
         ({"rule": "nearest"}, 'rule must be "touch" or "paper"'),
         ({"epsilon": -1.0}, "epsilon must be a finite number"),
-        ({"k": 2}, "k must be at least 3"),
+        ({"k": 2}, "k must be a whole number, 3 to 1000"),
     ],
 )
 def test_wrong_options_are_rejected(options, message):

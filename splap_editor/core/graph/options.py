@@ -1,0 +1,112 @@
+"""What makes two splats neighbours, and what the surface's stages are made by: options and their tables."""
+
+from dataclasses import dataclass, replace
+
+from splap_editor.core.options import Choice, check_options, option
+
+GRAPH_RULES = {
+    "touch": Choice(
+        "Best contacts",
+        "Each splat's best contacts, as far as they are mutual, and the best contacts between what that leaves apart.",
+        "splap_editor.core.graph.touch_rule:touch_edges",
+    ),
+    "paper": Choice(
+        "All within the gap",
+        "Every pair with a normal-wise offset of at most ε.",
+        "splap_editor.core.graph.offset_rule:offset_edges",
+    ),
+}
+"""Rules by name: ``rule(tree, epsilon, progress)`` gives (E, 2) edges and their (E,) touch scales or None."""
+
+
+@dataclass(frozen=True)
+class Neighborhood(Choice):
+    """A row of the table of neighbourhoods.
+
+    Parameters
+    ----------
+    mended : str
+        ``"module:name"`` of what brings them up to date after edges were cut or added, see `mended_neighborhoods`;
+        without it all are found again.
+    """
+
+    mended: str = ""
+
+
+NEIGHBORHOODS = {
+    "geodesic": Neighborhood(
+        "Along the surface",
+        "The k nearest by shortest path on the graph.",
+        "splap_editor.core.surface.neighborhoods:nearest_along_surface",
+        mended="splap_editor.core.surface.geodesics:mended_neighborhoods",
+    ),
+}
+"""Neighbourhoods by name: ``neighbors(ellipses, graph, k, progress)`` gives `Neighborhoods`."""
+
+LAPLACIANS = {
+    "stars": Choice(
+        "Cotangents of the stars",
+        "Cotangents of the local Delaunay stars, summed.",
+        "splap_editor.core.surface.laplacian:star_weights",
+    ),
+    "robust": Choice(
+        "Intrinsic Delaunay",
+        "Intrinsic Delaunay weights of the stars' union as one non-manifold mesh.",
+        "splap_editor.core.surface.laplacian:robust_weights",
+    ),
+}
+"""Laplacians by name: ``weights(centers, triangles)`` gives (n, n) symmetric weights, not negative, and (n,) masses."""
+
+
+@dataclass(frozen=True)
+class GraphOptions:
+    """What makes two splats neighbours.
+
+    Parameters
+    ----------
+    rule : str
+        One of `GRAPH_RULES`.
+    epsilon : float
+        Tolerance along the normals in units of the scene scale.
+    k : int
+        Number of geodesic neighbours the Laplacian is built from.
+    cut, add : tuple of (int, int)
+        Edges taken out of and put into the finished graph, as pairs of file rows.
+    neighborhood : str
+        One of `NEIGHBORHOODS`.
+    laplacian : str
+        One of `LAPLACIANS`.
+    """
+
+    rule: str = option("touch", "How neighbours are chosen.", label="Rule", choices=GRAPH_RULES)
+    epsilon: float = option(
+        0.005,
+        "Gap that still counts as touching, in units of the size.",
+        label="Gap ε",
+        least=0.0,
+        unit="of s",
+        is_percent=True,
+        step=0.0005,
+        decimals=5,
+    )
+    k: int = option(
+        30, "Nearest along the surface that the Laplacian is made of.", label="Neighbours k", least=3, most=1000
+    )
+    cut: tuple[tuple[int, int], ...] = option((), "Edges taken out of the finished graph, as pairs of file rows.")
+    add: tuple[tuple[int, int], ...] = option((), "Edges put into the finished graph, as pairs of file rows.")
+    neighborhood: str = option("geodesic", "Who counts as near a splat.", label="Nearest by", choices=NEIGHBORHOODS)
+    laplacian: str = option(
+        "stars", "How the stars of all splats become a Laplacian.", label="Laplacian", choices=LAPLACIANS
+    )
+
+    def __post_init__(self) -> None:
+        check_options(self)
+
+
+EDGE_OPTIONS = ("rule", "epsilon", "cut", "add")
+"""Options that the graph itself is made by; the others are for what is made of it."""
+
+
+def edges_only(options: GraphOptions) -> GraphOptions:
+    """Options with everything at its default that the graph's edges do not depend on."""
+    return replace(GraphOptions(), **{name: getattr(options, name) for name in EDGE_OPTIONS})

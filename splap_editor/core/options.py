@@ -1,0 +1,161 @@
+"""Options, each defined once: default, bounds, choices, unit and a sentence beside the field that holds them.
+
+An option group is a frozen dataclass whose fields are made by `option`. Recipes, their JSON Schema, error sentences,
+flags of the command line and forms in the window are all made from it.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
+from importlib import import_module
+from numbers import Integral, Real
+from typing import Any
+
+_KEY = "option"
+
+
+@dataclass(frozen=True)
+class ShareOfSize:
+    """A length left to the program: so many times the scene's size s, whatever that is."""
+
+    share: float
+
+
+Length = float | ShareOfSize | None
+"""World units, a share of the scene's size, or None for no bound."""
+
+
+def world_length(length: Length, size: float) -> float | None:
+    """Length in world units, in a scene of size s; None stays None."""
+    return length.share * size if isinstance(length, ShareOfSize) else length
+
+
+def loaded(function: str) -> Callable[..., Any]:
+    """Import what ``"module:name"`` names."""
+    module, _, name = function.partition(":")
+    return getattr(import_module(module), name)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One value that an option may have: a row of a table.
+
+    Parameters
+    ----------
+    label : str
+        Words for it in a form.
+    sentence : str
+        What it does.
+    function : str
+        ``"module:name"`` of what does it, imported by `load` alone.
+    """
+
+    label: str
+    sentence: str = ""
+    function: str = ""
+
+    @property
+    def module(self) -> str:
+        """Module of the function."""
+        return self.function.partition(":")[0]
+
+    def load(self) -> Callable[..., Any]:
+        """Import the function."""
+        return loaded(self.function)
+
+
+@dataclass(frozen=True)
+class Option:
+    """What is known of one option besides its default.
+
+    Parameters
+    ----------
+    sentence : str
+        What it does, for a tooltip, the command line's help and the schema.
+    label : str
+        In front of its field in a form.
+    above, least, most : float
+        Bounds of a number: greater than, at least, at most.
+    choices : mapping of str to Choice, optional
+    unit : str
+        ``"world"``: the file's units; ``"of s"``: units of the scene's size; empty for a bare number.
+    is_percent : bool
+        A form shows a hundred times the value.
+    step, decimals
+        Of the number in a form.
+    only_for : (str, tuple), optional
+        Name and values of another option of the group without which this one means nothing.
+    default : object
+        Filled in by `options_of`.
+    """
+
+    sentence: str
+    label: str = ""
+    above: float = -math.inf
+    least: float = -math.inf
+    most: float = math.inf
+    choices: Mapping[str, Choice] | None = None
+    unit: str = ""
+    is_percent: bool = False
+    step: float = 1.0
+    decimals: int = 3
+    only_for: tuple[str, tuple[str, ...]] | None = None
+    default: Any = None
+
+    @property
+    def kind(self) -> str:
+        """``"choice"``, ``"flag"``, ``"integer"``, ``"number"``, ``"length"`` or ``"pairs"``."""
+        if self.choices is not None:
+            return "choice"
+        kinds = ((bool, "flag"), (int, "integer"), (float, "number"), (ShareOfSize, "length"), (tuple, "pairs"))
+        return next(kind for held, kind in kinds if isinstance(self.default, held))
+
+    @property
+    def wanted(self) -> str:
+        """What a value must be, in words that go after "must be"."""
+        if self.kind == "choice":
+            return " or ".join(f'"{choice}"' for choice in self.choices)
+        if self.kind == "flag":
+            return "true or false"
+        if self.kind == "pairs":
+            return "a list of [row, row] pairs"
+        if self.kind == "integer":
+            return f"a whole number, {self.least:g} " + (f"to {self.most:g}" if self.most < math.inf else "or more")
+        low = f" greater than {self.above:g}" if self.above > -math.inf else ""
+        low = f" of at least {self.least:g}" if self.least > -math.inf else low
+        return f"a finite number{low}" + (f" and at most {self.most:g}" if self.most < math.inf else "")
+
+    def accepts(self, value: Any) -> bool:
+        """Whether a value is one that the option may have."""
+        if self.kind == "choice":
+            return isinstance(value, str) and value in self.choices
+        if self.kind == "flag":
+            return isinstance(value, bool)
+        if self.kind == "pairs":
+            return isinstance(value, tuple | list)
+        if self.kind == "length" and (value is None or isinstance(value, ShareOfSize)):
+            return value is None or self.accepts(value.share)
+        if isinstance(value, bool) or not isinstance(value, Integral if self.kind == "integer" else Real):
+            return False
+        try:
+            number = float(value)
+        except OverflowError:
+            return False
+        return math.isfinite(number) and number > self.above and self.least <= number <= self.most
+
+
+def option(default: Any, sentence: str, **known: Any) -> Any:
+    """Make the field of an option; for the arguments see `Option`."""
+    return field(default=default, metadata={_KEY: Option(sentence, default=default, **known)})
+
+
+def options_of(group: Any) -> dict[str, Option]:
+    """Options of a group, or of its class, by name in their order."""
+    return {each.name: each.metadata[_KEY] for each in fields(group) if _KEY in each.metadata}
+
+
+def check_options(group: Any) -> None:
+    """Raise a ValueError that names the first option of a group whose value is none; for ``__post_init__``."""
+    for name, known in options_of(group).items():
+        if not known.accepts(getattr(group, name)):
+            raise ValueError(f"{name} must be {known.wanted}, got {getattr(group, name)!r}")
