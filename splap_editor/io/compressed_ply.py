@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.splats.splats import Splats
+from splap_editor.io.layout import Layout, PlyEvidence
 from splap_editor.io.ply_header import PlyError
 from splap_editor.io.ply_table import PlyTable
 from splap_editor.io.splat_columns import SH_C0, column_group
@@ -12,7 +13,7 @@ CHUNK = 256
 """Splats that share one chunk's bounds."""
 
 
-def decompressed(table: PlyTable) -> Splats:
+def packed_splats(evidence: PlyEvidence, layout: Layout) -> tuple[Splats, list[str]]:
     """Decode a compressed table.
 
     Positions and log-scales are 11, 10 and 11 bits between their chunk's
@@ -22,19 +23,24 @@ def decompressed(table: PlyTable) -> Splats:
 
     Parameters
     ----------
-    table : PlyTable
-        With elements ``chunk``, ``vertex`` and perhaps ``sh``.
+    evidence : PlyEvidence
+        A table with elements ``chunk``, ``vertex`` and perhaps ``sh``.
+    layout : Layout
+        Whose normal axis the splats get.
 
     Returns
     -------
-    Splats
+    splats : Splats
         float32, in the file's order.
+    warnings : list of str
+        None of them.
 
     Raises
     ------
     PlyError
         If the elements do not belong together.
     """
+    table = evidence.table
     chunks = table.element("chunk")
     n = table.n_rows
     if chunks is None or len(chunks) * CHUNK < n:
@@ -60,14 +66,16 @@ def decompressed(table: PlyTable) -> Splats:
         raise PlyError(f"{table.name} is damaged: its chunks lack {error}. Export it again.") from None
     with np.errstate(divide="ignore"):
         opacities = np.log(colour[:, 3]) - np.log1p(-colour[:, 3])
-    return Splats(
+    splats = Splats(
         means=means,
         log_scales=scales,
         quats=_smallest_three(table.columns["packed_rotation"].astype(np.uint32)),
         logit_opacities=opacities,
         sh0=((rgb - 0.5) / SH_C0).astype(np.float32),
         shN=_harmonics(table),
+        normal_axis=layout.normal_axis,
     )
+    return splats, []
 
 
 def _unit_11_10_11(packed: NDArray) -> NDArray[np.float32]:

@@ -1,122 +1,168 @@
-"""Which trainer wrote a table of splats, and what its columns mean."""
+"""The layouts of splat files: a row for each trainer, and which of them wrote a table.
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+A new one is one more row: what its columns mean, and what gives it away.
+"""
+
+from collections.abc import Callable, Collection
+from dataclasses import replace
 from difflib import get_close_matches
 
 import numpy as np
 
-from splap_editor.io.ply_header import PlyError
+from splap_editor.io.compressed_ply import packed_splats
+from splap_editor.io.layout import AXIS_NAMES, CHOSEN, ColumnNames, Layout, PlyEvidence
+from splap_editor.io.ply_header import PlyError, PlyHeader
 from splap_editor.io.ply_table import PlyTable
+from splap_editor.io.splat_columns import plain_splats, require_whole_degrees, thresholded_splats
 
 FLAT_LOG_SCALE = -1e9
 """Log-scales below this stand for an extent of exactly zero (trainers write -1e10)."""
 
 
-AXIS_NAMES: dict[int | None, str] = {None: "thinnest", 0: "0", 1: "1", 2: "2"}
-"""Local axes that may be the surface normal, as they are written after a layout's name."""
+def _has(*columns: str) -> Callable[[Collection[str]], bool]:
+    """Whether any of some columns is there."""
+    return lambda names: any(column in names for column in columns)
 
-_CHOSEN = "chosen by hand"
+
+def _is_flat(evidence: PlyEvidence) -> bool:
+    return evidence.every("scale_2", lambda v: v <= FLAT_LOG_SCALE)
 
 
-@dataclass(frozen=True)
-class Layout:
-    """What a trainer's columns mean.
+def _spikes(evidence: PlyEvidence) -> str:
+    if not evidence.every("opacity", lambda v: (v >= 0) & (v <= 1)):
+        return ""
+    if _is_flat(evidence):
+        return "scale_2 is -1e10 and every opacity lies between 0 and 1"
+    beside = evidence.thresholds is not None and not isinstance(evidence.thresholds, str)
+    return "thresholds lie beside the file and every opacity lies between 0 and 1" if beside else ""
 
-    Parameters
-    ----------
-    name : str
-        Key of `LAYOUTS`.
-    reason : str
-        How it was recognised, as a clause: "two scales per splat".
-    normal_axis : int, optional
-        Local axis that is the surface normal, None for the thinnest one.
-    activated_opacity : bool
-        The ``opacity`` column holds α itself, not its logit.
-    n_scales : int
-        Scales that mean something, 2 or 3; a 2DGS file may carry an idle third.
-    bound : bool
-        Positions are relative to a mesh that the file does not hold.
-    axis_is_chosen : bool
-        A person chose the normal axis too.
-    """
 
-    name: str
-    reason: str
-    normal_axis: int | None = None
-    activated_opacity: bool = False
-    n_scales: int = 3
-    bound: bool = False
-    axis_is_chosen: bool = False
+def _are_surfels(evidence: PlyEvidence) -> str:
+    flat = _is_flat(evidence) and np.isfinite(evidence.table.columns["scale_2"][0])
+    return "scale_2 is -1e10 and opacities are logits" if flat else ""
 
-    @property
-    def is_chosen(self) -> bool:
-        """Whether a person chose it, against what would have been recognised."""
-        return self.reason == _CHOSEN
 
-    @property
-    def choice(self) -> str:
-        """What ``read_ply(layout=...)`` takes to read the file like this again: ``"3dgs"``, or ``"3dgs@1"``."""
-        axis = AXIS_NAMES[self.normal_axis]
-        return f"{self.name}@{axis}" if self.axis_is_chosen else self.name
+def _are_evenly_thick(evidence: PlyEvidence) -> str:
+    columns = evidence.table.columns
+    thickness = columns["scale_0"]
+    even = len(thickness) > 2 and evidence.every("scale_0", lambda v: v == thickness[0])
+    if even and np.ptp(columns["scale_1"]) > 0:
+        return "the first scale is the same everywhere, as SuGaR's refined splats have it"
+    return ""
 
 
 LAYOUTS: dict[str, Layout] = {
     layout.name: layout
     for layout in (
-        Layout("3dgs", "the common columns"),
-        Layout("2dgs", "two scales per splat", normal_axis=2, n_scales=2),
-        Layout("spikinggs", "flat splats with opacity between 0 and 1", normal_axis=2, activated_opacity=True),
-        Layout("gaussian-surfels", "flat splats, scale_2 is -1e10", normal_axis=2),
-        Layout("pgsr", _CHOSEN),
-        Layout("gof", "a filter_3D column"),
-        Layout("rade-gs", "a filter_3D column"),
-        Layout("sugar", "one and the same scale_0 everywhere", normal_axis=0),
-        Layout("mani-gs", "material columns", bound=True),
-        Layout("gaussianmesh", "columns that bind splats to triangles", bound=True),
-        Layout("sc-gs", "fea_ columns"),
-        Layout("gsplat", "gsplat's column order"),
-        Layout("brush", "Brush's comment or column order"),
-        Layout("nerfstudio", "Nerfstudio's comment or its red, green, blue columns"),
-        Layout("supersplat", "SuperSplat's column order"),
-        Layout("supersplat-compressed", "packed columns in chunks"),
-        Layout("postshot", "an antialiased comment"),
+        Layout(
+            "3dgs",
+            "the common columns, in no known program's order",
+            plain_splats,
+            by_order=("x", "nx", "f_dc_0", "opacity", "scale_0", "rot_0"),
+        ),
+        Layout(
+            "2dgs",
+            "two scales per splat",
+            plain_splats,
+            ColumnNames(log_scales=("scale_0", "scale_1")),
+            normal_axis=2,
+            by_columns=lambda names: "scale_2" not in names,
+        ),
+        Layout(
+            "spikinggs",
+            "flat splats with opacity between 0 and 1",
+            thresholded_splats,
+            normal_axis=2,
+            activated_opacity=True,
+            by_values=_spikes,
+        ),
+        Layout(
+            "gaussian-surfels",
+            "flat splats, scale_2 is -1e10",
+            plain_splats,
+            normal_axis=2,
+            by_values=_are_surfels,
+        ),
+        Layout(
+            "sugar",
+            "one and the same scale_0 everywhere",
+            plain_splats,
+            normal_axis=0,
+            by_values=_are_evenly_thick,
+        ),
+        # PGSR writes what 3DGS writes, and RaDe-GS what GOF writes: they can only be chosen by hand.
+        Layout("pgsr", CHOSEN, plain_splats),
+        Layout("rade-gs", CHOSEN, plain_splats),
+        Layout(
+            "gaussianmesh",
+            "columns that bind splats to triangles",
+            plain_splats,
+            bound=True,
+            by_columns=_has("v_index1", "face_id"),
+        ),
+        Layout(
+            "mani-gs",
+            "material columns",
+            plain_splats,
+            bound=True,
+            by_columns=_has("base_color_0", "incidents_dc_0", "visibility_dc_0"),
+        ),
+        Layout("gof", "a filter_3D column, as GOF and RaDe-GS write", plain_splats, by_columns=_has("filter_3D")),
+        Layout("sc-gs", "fea_ columns", plain_splats, by_columns=_has("fea_0")),
+        Layout(
+            "brush",
+            "Brush's comment or column order",
+            plain_splats,
+            by_comments=("exported from brush",),
+            by_order=("x", "scale_0", "opacity", "rot_0", "f_dc_0"),
+        ),
+        Layout(
+            "supersplat",
+            "SuperSplat's comment or column order",
+            plain_splats,
+            by_comments=("generated by supersplat",),
+            by_order=("x", "rot_0", "scale_0", "opacity", "f_dc_0"),
+        ),
+        Layout(
+            "supersplat-compressed",
+            "packed columns in chunks",
+            packed_splats,
+            columns=None,
+            packed=("packed_position", "packed_rotation", "packed_scale", "packed_color"),
+            by_columns=_has("packed_position"),
+        ),
+        Layout(
+            "gsplat", "gsplat's column order", plain_splats, by_order=("x", "f_dc_0", "opacity", "scale_0", "rot_0")
+        ),
+        Layout(
+            "nerfstudio",
+            "Nerfstudio's comment or its red, green, blue columns",
+            plain_splats,
+            by_comments=("generated by nerfstudio", "generated by nerstudio"),
+            by_order=("x", "red", "green", "blue"),
+        ),
+        Layout("postshot", "an antialiased comment", plain_splats, by_comments=("antialiased",)),
     )
 }
-"""Every layout by the name that ``read_ply(layout=...)`` takes, with its usual sign."""
+"""Every layout by the name that ``read_ply(layout=...)`` takes; of several that are given away the first is meant."""
 
-_COMPRESSED = LAYOUTS["supersplat-compressed"]
-_ORDERS = {
-    "3dgs": ("x", "nx", "f_dc_0", "opacity", "scale_0", "rot_0"),
-    "brush": ("x", "scale_0", "opacity", "rot_0", "f_dc_0"),
-    "supersplat": ("x", "rot_0", "scale_0", "opacity", "f_dc_0"),
-    "gsplat": ("x", "f_dc_0", "opacity", "scale_0", "rot_0"),
-}
-_COMMENTS = {
-    "exported from brush": "brush",
-    "generated by nerfstudio": "nerfstudio",
-    "generated by nerstudio": "nerfstudio",
-    "generated by supersplat": "supersplat",
-    "antialiased": "postshot",
-}
+PLAIN = LAYOUTS["3dgs"]
+"""What every program reads, and what is written where a file's own layout cannot hold an edit."""
 
 
-def layout_of(table: PlyTable, *, chosen: str | None = None, has_thresholds: Callable[[], bool] = bool) -> Layout:
+def layout_of(evidence: PlyEvidence, *, chosen: str | None = None) -> Layout:
     """Recognise the layout of a table of splats.
 
     Columns decide before values, values before comments, comments before the
-    order of the columns. PGSR writes what 3DGS writes and RaDe-GS what GOF
-    writes: the second of each pair can only be chosen by hand.
+    order of the columns.
 
     Parameters
     ----------
-    table : PlyTable
-        Vertex columns by name.
+    evidence : PlyEvidence
+        The table, and what lies beside its file.
     chosen : str, optional
         Name of the layout to take instead; its meaning must suit the columns. ``"3dgs@1"`` also names the normal
         axis: ``thinnest``, ``0``, ``1`` or ``2``.
-    has_thresholds : callable () → bool
-        Whether SpikingGS thresholds for these rows lie beside the file.
 
     Raises
     ------
@@ -124,15 +170,26 @@ def layout_of(table: PlyTable, *, chosen: str | None = None, has_thresholds: Cal
         If ``chosen`` is no layout, or one that these columns cannot have.
     """
     if chosen is not None:
-        return _chosen_layout(table, chosen)
-    columns = table.columns
-    name, reason = _name_by_columns(columns) or _name_by_values(table, has_thresholds) or _name_by_origin(table)
-    layout = LAYOUTS[name]
-    return _with_reason(layout, reason or layout.reason)
-
-
-def _with_reason(layout: Layout, reason: str) -> Layout:
-    return replace(layout, reason=reason)
+        return _chosen_layout(evidence.table, chosen)
+    columns = evidence.table.columns
+    known = [layout for layout in LAYOUTS.values() if not layout.missing(columns)]
+    for layout in known:
+        if layout.by_columns is not None and layout.by_columns(columns):
+            return layout
+    for layout in known:
+        reason = layout.by_values(evidence) if layout.by_values is not None else ""
+        if reason:
+            return replace(layout, reason=reason)
+    for comment in evidence.table.header.comments:
+        for layout in known:
+            if comment.lower().startswith(layout.by_comments):
+                return replace(layout, reason=f"the comment {comment!r}")
+    position = {name: i for i, name in enumerate(columns)}
+    for layout in known:
+        places = [position.get(column, -1) for column in layout.by_order]
+        if places and min(places) >= 0 and places == sorted(places):
+            return replace(layout, reason="its columns and their order")
+    return PLAIN
 
 
 def _chosen_layout(table: PlyTable, chosen: str) -> Layout:
@@ -143,85 +200,68 @@ def _chosen_layout(table: PlyTable, chosen: str) -> Layout:
         hint = f" (did you mean {near[0]!r}?)" if near else ""
         raise PlyError(f"{chosen!r} is no layout{hint}. Choose one of {', '.join(LAYOUTS)}.")
     layout = LAYOUTS[chosen]
-    packed = "packed_position" in table.columns
-    if packed != (layout is _COMPRESSED):
-        held = "packed" if packed else "plain"
-        raise PlyError(f"{table.name} holds {held} columns: it cannot be read as {chosen!r}.")
-    if layout.n_scales == 3 and not packed and "scale_2" not in table.columns:
-        raise PlyError(f"{table.name} has two scales per splat: it can only be read as '2dgs', not as {chosen!r}.")
+    missing = layout.missing(table.columns)
+    if missing:
+        raise PlyError(
+            f"{table.name} cannot be read as {chosen!r}: it lacks the columns {', '.join(missing)}. "
+            f"Choose one of {', '.join(suiting_layouts(table))}."
+        )
     if not at:
-        return _with_reason(layout, _CHOSEN)
+        return replace(layout, reason=CHOSEN)
     axes = {name: number for number, name in AXIS_NAMES.items()}
     if axis not in axes:
         raise PlyError(f"{axis!r} is no normal axis. Choose one of {', '.join(axes)}.")
     if layout.n_scales == 2 and axes[axis] != 2:
         raise PlyError(f"splats of {chosen!r} are flat across their axis 2: no other can be their normal.")
-    return replace(layout, reason=_CHOSEN, normal_axis=axes[axis], axis_is_chosen=True)
+    return replace(layout, reason=CHOSEN, normal_axis=axes[axis], axis_is_chosen=True)
 
 
 def suiting_layouts(table: PlyTable) -> list[str]:
     """Names of the layouts that a table could be read as."""
-    names = []
-    for name in LAYOUTS:
-        try:
-            _chosen_layout(table, name)
-        except PlyError:
-            continue
-        names.append(name)
-    return names
+    return [layout.name for layout in LAYOUTS.values() if not layout.missing(table.columns)]
 
 
-def _name_by_columns(columns: dict) -> tuple[str, str] | None:
-    """Layouts that a column of their own gives away."""
-    if "packed_position" in columns:
-        return "supersplat-compressed", ""
-    if {"v_index1", "face_id"} & columns.keys():
-        return "gaussianmesh", ""
-    if {"base_color_0", "incidents_dc_0", "visibility_dc_0"} & columns.keys():
-        return "mani-gs", ""
-    if "scale_2" not in columns:
-        return "2dgs", ""
-    if "filter_3D" in columns:
-        return "gof", "a filter_3D column, as GOF and RaDe-GS write"
-    if "fea_0" in columns:
-        return "sc-gs", ""
-    return None
+def require_splats(header: PlyHeader, name: str) -> None:
+    """Refuse a header that describes no splats of any layout.
+
+    Raises
+    ------
+    PlyError
+        If it is of a mesh or a bare point cloud, empty, or lacks columns.
+    """
+    vertex = header.element("vertex")
+    if vertex is None:
+        raise PlyError(f"{name} has no 'vertex' element, so no splats. Choose a .ply that a splat trainer wrote.")
+    if not any(map(_is_of_splats, vertex.names)):
+        faces = any(element.name == "face" and element.count for element in header.elements)
+        what = "a mesh" if faces else "a plain point cloud"
+        raise PlyError(
+            f"{name} is {what}, not Gaussian splats: it has no opacity, scale or rot columns. "
+            "Choose the trainer's point_cloud.ply."
+        )
+    numbers = [p.name for p in vertex.properties if p.length_type is None]
+    nearest = min(LAYOUTS.values(), key=lambda layout: _distance_from(layout, numbers))
+    missing = nearest.missing(numbers)
+    if missing:
+        raise PlyError(f"{name} lacks the columns {', '.join(missing)}. Export it again with all splat columns.")
+    if vertex.count == 0:
+        raise PlyError(f"{name} holds zero splats. Choose a file with splats in it.")
+    if nearest.columns is not None:
+        require_whole_degrees(numbers, nearest.columns, name)
 
 
-def _name_by_values(table: PlyTable, has_thresholds: Callable[[], bool]) -> tuple[str, str] | None:
-    """Layouts whose numbers give them away."""
-    columns = table.columns
-    flat = _all(columns["scale_2"], lambda v: v <= FLAT_LOG_SCALE)
-    if _all(columns["opacity"], lambda v: (v >= 0) & (v <= 1)):
-        if flat:
-            return "spikinggs", "scale_2 is -1e10 and every opacity lies between 0 and 1"
-        if has_thresholds():
-            return "spikinggs", "thresholds lie beside the file and every opacity lies between 0 and 1"
-    if flat and np.isfinite(columns["scale_2"][0]):
-        return "gaussian-surfels", "scale_2 is -1e10 and opacities are logits"
-    thickness = columns["scale_0"]
-    if len(thickness) > 2 and _all(thickness, lambda v: v == thickness[0]) and np.ptp(columns["scale_1"]) > 0:
-        return "sugar", "the first scale is the same everywhere, as SuGaR's refined splats have it"
-    return None
+def _distance_from(layout: Layout, names: Collection[str]) -> tuple[bool, int, int]:
+    """How far columns are from a layout: one that they fit is near, then the one that they share most with."""
+    needed, missing = layout.needed(names), layout.missing(names)
+    return bool(missing), len(missing) - len(needed), len(missing)
 
 
-def _name_by_origin(table: PlyTable) -> tuple[str, str]:
-    """Layouts that differ from the common one in comments or order only."""
-    for comment in table.header.comments:
-        for start, name in _COMMENTS.items():
-            if comment.lower().startswith(start):
-                return name, f"the comment {comment!r}"
-    if "f_dc_0" not in table.columns:
-        return "nerfstudio", "colours as red, green, blue"
-    position = {name: i for i, name in enumerate(table.columns)}
-    for name, order in _ORDERS.items():
-        places = [position.get(column, -1) for column in order]
-        if min(places) >= 0 and places == sorted(places):
-            return name, "its columns and their order"
-    return "3dgs", "the common columns, in no known program's order"
-
-
-def _all(values: np.ndarray, test: Callable[[np.ndarray], np.ndarray]) -> bool:
-    """Whether every value passes; a first look at a few spares most files the whole column."""
-    with np.errstate(invalid="ignore"):
-        return bool(test(values[:64]).all() and test(values).all())
+def _is_of_splats(column: str) -> bool:
+    """Whether only splats have a column of that name, in some layout."""
+    for layout in LAYOUTS.values():
+        names = layout.columns
+        if column in layout.packed:
+            return True
+        if names is not None and column in (names.opacity, *names.log_scales, *names.quats, *names.sh0):
+            return True
+    return False

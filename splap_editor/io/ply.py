@@ -11,13 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.splats.splats import Splats
 from splap_editor.io.atomic_file import atomic_file
-from splap_editor.io.layouts import Layout, layout_of
+from splap_editor.io.layout import Layout, PlyEvidence
+from splap_editor.io.layouts import PLAIN, layout_of, require_splats
 from splap_editor.io.lint import unusable_rows
-from splap_editor.io.ply_header import PlyError, PlyHeader
-from splap_editor.io.ply_table import NewColumn, PlyTable, read_table
+from splap_editor.io.ply_header import PlyError
+from splap_editor.io.ply_reader import read_table
+from splap_editor.io.ply_table import NewColumn, PlyTable
 from splap_editor.io.splat_cells import SplatCells, plain_table
-from splap_editor.io.splat_columns import require_splat_columns, splat_columns, splats_of
-from splap_editor.io.thresholds import Thresholds, read_thresholds, sibling_npz
+from splap_editor.io.splat_columns import SplatColumns, splat_columns
 
 __all__ = ["PlyError", "SplatFile", "read_ply", "write_ply"]
 
@@ -73,33 +74,10 @@ def read_ply(path: str | os.PathLike[str], *, layout: str | None = None, progres
     """
     path = Path(path)
     glance = _Glance()
-    table = read_table(path, accepts=_require_splats, glance=glance.look, progress=part_of(progress, 0.0, 0.9))
-    npz = sibling_npz(path)
-    thresholds: list[Thresholds | str] = []
-
-    def has_thresholds() -> bool:
-        if npz is not None and not thresholds:
-            thresholds.append(read_thresholds(npz, table.n_rows))
-        return bool(thresholds) and isinstance(thresholds[0], Thresholds)
-
-    found = layout_of(table, chosen=layout, has_thresholds=has_thresholds)
-    warnings = []
-    if found.name == "supersplat-compressed":
-        from splap_editor.io.compressed_ply import decompressed
-
-        splats = decompressed(table)
-    else:
-        spiking = found.name == "spikinggs"
-        usable = thresholds[0] if spiking and has_thresholds() else None
-        if spiking and usable is None:
-            warnings.append(thresholds[0] if thresholds else _NO_THRESHOLDS.format(path.stem))
-        splats = splats_of(
-            table,
-            splat_columns(table, found),
-            found,
-            thresholds=usable and usable.cutoffs,
-            opacity_floor=usable.opacity_floor if usable else 0.0,
-        )
+    table = read_table(path, accepts=require_splats, glance=glance.look, progress=part_of(progress, 0.0, 0.9))
+    evidence = PlyEvidence(table, path)
+    found = layout_of(evidence, chosen=layout)
+    splats, warnings = found.splats(evidence, found)
     if found.bound:
         warnings.append(_BOUND.format(found.name))
     if found.activated_opacity or not glance.shows_only_usable_rows(table.n_rows):
@@ -130,18 +108,9 @@ class _Glance:
         return self._n_clean == n_rows
 
 
-_NO_THRESHOLDS = (
-    "SpikingGS keeps its thresholds in an .npz file and none lies beside this one: splats are taken to reach as far as "
-    "without. Put {0}.npz or point_cloud.npz of the same iteration beside it."
-)
 _BOUND = (
     "This file is of {0}, whose splats are bound to a mesh that it does not hold: what you see may not be the object."
 )
-
-
-def _require_splats(header: PlyHeader, name: str) -> None:
-    """Refuse a header that describes no splats."""
-    require_splat_columns(header.element("vertex"), header.elements, name)
 
 
 def _require_finite_positions(means: NDArray[np.floating], name: str) -> None:
@@ -199,14 +168,15 @@ def write_ply(
     """
     _require_same_shape(splats, file.splats)
     table, rest = file.table, file.splats
-    if file.layout.name == "supersplat-compressed":
+    names = file.layout.columns
+    if names is None:
         cells = SplatCells(None, file.layout, rest, splats)
         if as_3dgs or extra or cells.any_changed():
-            table = plain_table(table.name, splats)
+            table, names = plain_table(table.name, splats), PLAIN.columns
             rest = splats
-    columns = None if "packed_position" in table.columns else splat_columns(table, file.layout)
+    columns = None if names is None else splat_columns(table, names)
     cells = SplatCells(columns, file.layout, rest, splats, table)
-    added = _added_columns(table, as_3dgs, extra or {})
+    added = _added_columns(table, columns if as_3dgs else None, extra or {})
     header = table.header.with_columns([(column.after, column.name) for column in added])
     blocks = table.blocks(cells.changes, added)
     _write_blocks(Path(path), header, blocks, table.body.nbytes, progress)
@@ -244,11 +214,13 @@ def _require_same_shape(splats: Splats, rest: Splats) -> None:
             raise ValueError(f"splats.{part} must have the file's shape {wanted}, got {got}")
 
 
-def _added_columns(table: PlyTable, as_3dgs: bool, extra: Mapping[str, ArrayLike]) -> list[NewColumn]:
-    """Columns to add to the file."""
+def _added_columns(table: PlyTable, thickened: SplatColumns | None, extra: Mapping[str, ArrayLike]) -> list[NewColumn]:
+    """Columns to add to the file: a third scale to flat splats that shall be thickened, and extra ones."""
     added = []
-    if as_3dgs and "scale_2" not in table.columns and "scale_1" in table.columns:
-        added.append(NewColumn("scale_1", "scale_2", np.full(table.n_rows, THIN_LOG_SCALE, np.float32)))
+    third = PLAIN.columns.log_scales[2]
+    if thickened is not None and third not in table.columns:
+        second = thickened.log_scales[1]
+        added.append(NewColumn(second, third, np.full(table.n_rows, THIN_LOG_SCALE, np.float32)))
     last = table.header.element("vertex").names[-1]
     for name, values in extra.items():
         values = np.asarray(values, np.float32)

@@ -4,9 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.splats.splats import Splats
-from splap_editor.io.layouts import Layout
+from splap_editor.io.layout import Layout
 from splap_editor.io.ply_header import ply_header
-from splap_editor.io.ply_table import CellChanges, PlyTable
+from splap_editor.io.ply_table import CellChanges, PlyTable, binary_table
 from splap_editor.io.splat_columns import SplatColumns, column_group, rgb_of_sh0
 
 _UNIT_TOLERANCE = 1e-2
@@ -96,7 +96,7 @@ class SplatCells:
         """Add changed degree-0 colours, as red, green, blue if the file has them so."""
         before, after = self._both("sh0", lo, hi)
         names = self._columns.sh0
-        if names[0] != "red":
+        if not self._columns.is_rgb:
             self._plain(found, names, before, after)
             return
         different = _differs(before, after)
@@ -172,7 +172,4 @@ def plain_table(name: str, splats: Splats) -> PlyTable:
     lines = ["ply", "format binary_little_endian 1.0", f"element vertex {n}"]
     lines += [f"property float {column}" for column in names] + ["end_header", ""]
     header = ply_header("\n".join(lines).encode(), name)
-    table = PlyTable(name, header, body.reshape(-1).view(np.uint8))
-    rows = table.element("vertex")
-    table.columns.update({column: rows[column] for column in names})
-    return table
+    return binary_table(name, header, body.reshape(-1).view(np.uint8))

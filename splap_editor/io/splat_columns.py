@@ -1,27 +1,27 @@
 """Which columns hold which part of a splat, and the arrays they make."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.splats.splats import Splats
-from splap_editor.io.layouts import Layout
-from splap_editor.io.ply_header import PlyElement, PlyError
+from splap_editor.io.layout import ColumnNames, Layout, PlyEvidence
+from splap_editor.io.ply_header import PlyError
 from splap_editor.io.ply_table import PlyTable
+from splap_editor.io.thresholds import Thresholds
 
 SH_C0 = 0.28209479177387814
 _REST_COUNTS = (0, 9, 24, 45, 72)
-_SPLAT_COLUMNS = frozenset({"opacity", "scale_0", "rot_0", "f_dc_0"})
-_RGB = ("red", "green", "blue")
 _BLOCK_ROWS = 1 << 12
 
 
 @dataclass(frozen=True)
 class SplatColumns:
-    """Column names of each part of a splat, in the order of the arrays of `Splats`.
+    """Column names of each part of a splat that a table has, in the order of the arrays of `Splats`.
 
-    ``sh_rest`` is channel-major, as files hold it: ``f_rest_[c K + k]``.
+    ``sh_rest`` is channel-major, as files hold it: ``f_rest_[c K + k]``; ``sh0`` names colours if ``is_rgb``.
     """
 
     means: tuple[str, ...]
@@ -29,125 +29,110 @@ class SplatColumns:
     quats: tuple[str, ...]
     opacity: str
     sh0: tuple[str, ...]
+    is_rgb: bool
     sh_rest: tuple[str, ...]
     normals: tuple[str, ...]
     filter_radius: str | None
 
 
-def require_splat_columns(element: PlyElement | None, elements: tuple[PlyElement, ...], name: str) -> None:
-    """Refuse a vertex element that does not hold splats.
+def require_whole_degrees(held: Collection[str], names: ColumnNames, name: str) -> tuple[str, ...]:
+    """Names of the higher spherical-harmonic columns, by number.
 
     Raises
     ------
     PlyError
-        If it is a mesh or a bare point cloud, empty, or lacks columns.
+        If they do not make up whole degrees.
     """
-    if element is None:
-        raise PlyError(f"{name} has no 'vertex' element, so no splats. Choose a .ply that a splat trainer wrote.")
-    names = set(element.names)
-    if "packed_position" in names:
-        missing = [c for c in ("packed_rotation", "packed_scale", "packed_color") if c not in names]
-    else:
-        if not names & _SPLAT_COLUMNS:
-            faces = any(e.name == "face" and e.count for e in elements)
-            what = "a mesh" if faces else "a plain point cloud"
-            raise PlyError(
-                f"{name} is {what}, not Gaussian splats: it has no opacity, scale or rot columns. "
-                "Choose the trainer's point_cloud.ply."
-            )
-        colours = [] if set(_RGB) <= names else ["f_dc_0", "f_dc_1", "f_dc_2"]
-        needed = ["x", "y", "z", "opacity", "scale_0", "scale_1", "rot_0", "rot_1", "rot_2", "rot_3", *colours]
-        missing = [c for c in needed if c not in names]
-    scalars = {p.name for p in element.properties if p.length_type is None}
-    missing += [c for c in sorted(names - scalars) if c in _SPLAT_COLUMNS or c in ("x", "y", "z")]
-    if missing:
-        raise PlyError(f"{name} lacks the columns {', '.join(missing)}. Export it again with all splat columns.")
-    if element.count == 0:
-        raise PlyError(f"{name} holds zero splats. Choose a file with splats in it.")
-    _sh_rest_names(names, name)
-
-
-def _sh_rest_names(names: set[str], name: str) -> tuple[str, ...]:
-    """Names of the f_rest columns by number.
-
-    Raises
-    ------
-    PlyError
-        If they do not make up whole spherical-harmonic degrees.
-    """
-    n_rest = sum(column.startswith("f_rest_") for column in names)
-    rest = tuple(f"f_rest_{i}" for i in range(n_rest))
-    gaps = [column for column in rest if column not in names]
+    n_rest = sum(column.startswith(names.sh_rest) for column in held)
+    rest = tuple(f"{names.sh_rest}{i}" for i in range(n_rest))
+    gaps = [column for column in rest if column not in held]
     if n_rest not in _REST_COUNTS or gaps:
         what = f"{gaps[0]} is missing" if gaps else "0, 9, 24, 45 or 72 make whole degrees"
+        columns = f"{names.sh_rest.rstrip('_')} columns"
         raise PlyError(
-            f"{name} has inconsistent spherical-harmonic columns: {n_rest} f_rest columns, but {what}. "
-            "Export it again, or without f_rest columns."
+            f"{name} has inconsistent spherical-harmonic columns: {n_rest} {columns}, but {what}. "
+            f"Export it again, or without {columns}."
         )
     return rest
 
 
-def splat_columns(table: PlyTable, layout: Layout) -> SplatColumns:
+def splat_columns(table: PlyTable, names: ColumnNames) -> SplatColumns:
     """Find the columns of each part of a splat."""
-    names = table.columns.keys()
+    held = table.columns.keys()
+    is_rgb = names.sh0[0] not in held
     return SplatColumns(
-        means=("x", "y", "z"),
-        log_scales=("scale_0", "scale_1", "scale_2")[: layout.n_scales],
-        quats=("rot_0", "rot_1", "rot_2", "rot_3"),
-        opacity="opacity",
-        sh0=("f_dc_0", "f_dc_1", "f_dc_2") if "f_dc_0" in names else _RGB,
-        sh_rest=_sh_rest_names(set(names), table.name),
-        normals=("nx", "ny", "nz") if {"nx", "ny", "nz"} <= names else (),
-        filter_radius="filter_3D" if "filter_3D" in names else None,
+        means=names.means,
+        log_scales=names.log_scales,
+        quats=names.quats,
+        opacity=names.opacity,
+        sh0=names.rgb if is_rgb else names.sh0,
+        is_rgb=is_rgb,
+        sh_rest=require_whole_degrees(held, names, table.name),
+        normals=names.normals if set(names.normals) <= held else (),
+        filter_radius=names.filter_radius if names.filter_radius in held else None,
     )
 
 
-def splats_of(
-    table: PlyTable,
-    columns: SplatColumns,
-    layout: Layout,
-    *,
-    thresholds: NDArray[np.floating] | None = None,
-    opacity_floor: float = 0.0,
-) -> Splats:
-    """Make splats of a table; arrays are views into it wherever its bytes allow.
+def plain_splats(
+    evidence: PlyEvidence, layout: Layout, thresholds: Thresholds | None = None
+) -> tuple[Splats, list[str]]:
+    """Make splats of a table whose columns are numbers; arrays are views into it wherever its bytes allow.
 
     Parameters
     ----------
-    table : PlyTable
+    evidence : PlyEvidence
         The file.
-    columns : SplatColumns
-        Where each part is.
     layout : Layout
-        What the columns mean.
-    thresholds : (N,) float, optional
-        SpikingGS thresholds.
-    opacity_floor : float
-        Opacities below it count as zero (SpikingGS ``Vth_opa``).
+        Where its columns are and what they mean.
+    thresholds : Thresholds, optional
+        Where SpikingGS's kernels end; opacities below its floor count as zero.
+
+    Returns
+    -------
+    splats : Splats
+    warnings : list of str
+        None of them.
     """
-    held = table.columns
+    table = evidence.table
+    columns, held = splat_columns(table, layout.columns), table.columns
     n_rest = len(columns.sh_rest)
     rest = column_group(held, columns.sh_rest) if n_rest else np.zeros((table.n_rows, 0), np.float32)
     sh0 = column_group(held, columns.sh0)
-    if columns.sh0 == _RGB:
-        sh0 = sh0_of_rgb(sh0, held["red"].dtype)
+    if columns.is_rgb:
+        sh0 = sh0_of_rgb(sh0, held[columns.sh0[0]].dtype)
     opacities = column_group(held, (columns.opacity,))[:, 0]
     if layout.activated_opacity:
-        opacities = logits(opacities, opacity_floor)
+        opacities = logits(opacities, thresholds.opacity_floor if thresholds is not None else 0.0)
     filter_radii = None
     if columns.filter_radius is not None:
         filter_radii = column_group(held, (columns.filter_radius,))[:, 0]
-    return Splats(
+    splats = Splats(
         means=column_group(held, columns.means),
         log_scales=column_group(held, columns.log_scales),
         quats=column_group(held, columns.quats),
         logit_opacities=opacities,
         sh0=sh0,
         shN=rest.reshape(table.n_rows, 3, n_rest // 3).transpose(0, 2, 1),
-        thresholds=thresholds,
+        thresholds=None if thresholds is None else thresholds.cutoffs,
         filter_radii=filter_radii,
         normal_axis=layout.normal_axis,
     )
+    return splats, []
+
+
+def thresholded_splats(evidence: PlyEvidence, layout: Layout) -> tuple[Splats, list[str]]:
+    """Make splats of a table with the thresholds that SpikingGS leaves beside it; a warning if there are none."""
+    thresholds = evidence.thresholds
+    if isinstance(thresholds, Thresholds):
+        return plain_splats(evidence, layout, thresholds)
+    splats, _ = plain_splats(evidence, layout)
+    return splats, [_NO_THRESHOLDS.format(evidence.path.stem) if thresholds is None else thresholds]
+
+
+_NO_THRESHOLDS = (
+    "SpikingGS keeps its thresholds in an .npz file and none lies beside this one: splats are taken to reach as far as "
+    "without. Put {0}.npz or point_cloud.npz of the same iteration beside it."
+)
 
 
 def column_group(columns: dict[str, NDArray], names: tuple[str, ...]) -> NDArray[np.floating]:

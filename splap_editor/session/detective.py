@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from splap_editor.core.splats.occupancy import Ellipses, InertReason
 from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.scene_info import flatness
-from splap_editor.io.layouts import Layout
+from splap_editor.io.layout import Layout
 from splap_editor.io.lint import lint
 
 ROUND = 0.6

@@ -1,10 +1,14 @@
 """Each trainer's file is recognised, by what gives it away, and can be read as another's."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from splap_editor.io.layout import ColumnNames, Layout
 from splap_editor.io.layouts import LAYOUTS, suiting_layouts
-from splap_editor.io.ply import PlyError, read_ply
+from splap_editor.io.ply import PlyError, read_ply, write_ply
+from splap_editor.io.splat_columns import plain_splats
 from tests.reference.ply import compressed_bytes, ply_bytes, splat_columns
 
 FLAT = np.full(20, -1e10, "f4")
@@ -140,3 +144,33 @@ def test_a_normal_axis_that_cannot_be_is_refused(tmp_path, sample, chosen, messa
     (tmp_path / "plain.ply").write_bytes(FILES[sample]())
     with pytest.raises(PlyError, match=message):
         read_ply(tmp_path / "plain.ply", layout=chosen)
+
+
+def test_a_new_layout_is_one_row(tmp_path, monkeypatch):
+    """Columns of other names, another meaning and a sign of its own: recognised, read, and written back."""
+    names = ColumnNames(means=("px", "py", "pz"), opacity="alpha", log_scales=("s0", "s1"), sh_rest="sh_")
+    ours = Layout(
+        "ours",
+        "an alpha column",
+        plain_splats,
+        names,
+        normal_axis=2,
+        activated_opacity=True,
+        by_columns=lambda held: "alpha" in held,
+    )
+    monkeypatch.setitem(LAYOUTS, "ours", ours)
+    path, out = tmp_path / "ours.ply", tmp_path / "out.ply"
+    renamed = {"x": "px", "y": "py", "z": "pz", "opacity": "alpha", "scale_0": "s0", "scale_1": "s1"}
+    columns = held(n_scales=2, n_rest=9) | {"opacity": SHARE}
+    path.write_bytes(ply_bytes({renamed.get(c, c).replace("f_rest_", "sh_"): v for c, v in columns.items()}))
+    file = read_ply(path)
+    assert file.layout == ours and file.splats.n_scales == 2 and file.splats.shN.shape == (20, 3, 3)
+    np.testing.assert_allclose(file.splats.opacities, SHARE, atol=1e-7)  # float32
+    write_ply(out, file, file.splats)
+    assert out.read_bytes() == path.read_bytes()
+    write_ply(out, file, replace(file.splats, means=file.splats.means + 1), as_3dgs=True)
+    np.testing.assert_array_equal(read_ply(out).table.columns["px"], columns["x"] + 1)
+    assert list(read_ply(out).table.columns)[-5:] == ["scale_2", *names.quats]
+    path.write_bytes(ply_bytes({"alpha": SHARE, "s0": SHARE}))
+    with pytest.raises(PlyError, match="lacks the columns px, py, pz, s1"):
+        read_ply(path)

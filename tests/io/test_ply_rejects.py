@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from splap_editor.io import ply_table
+from splap_editor.io import ply_reader
 from splap_editor.io.ply import PlyError, read_ply, write_ply
 from tests.reference.ply import compressed_bytes, ply_bytes, splat_columns
 
@@ -75,8 +75,8 @@ def no_memory(monkeypatch, available):
     def nothing_left(*_):
         raise MemoryError
 
-    monkeypatch.setattr(ply_table, "available_memory", lambda: available)
-    monkeypatch.setattr(ply_table.np, "empty", nothing_left)
+    monkeypatch.setattr(ply_reader, "available_memory", lambda: available)
+    monkeypatch.setattr(ply_reader.np, "empty", nothing_left)
 
 
 def test_a_lying_count_is_refused_before_memory_is_taken(tmp_path, monkeypatch):
@@ -172,9 +172,9 @@ def test_a_layout_the_columns_cannot_have_is_refused(tmp_path):
     sentence = refused(tmp_path, ply_bytes(columns()), "'3dg' is no layout", layout="3dg")
     assert "did you mean '3dgs'" in sentence
     assert "gaussian-surfels" in sentence
-    refused(tmp_path, ply_bytes(columns()), "plain columns", layout="supersplat-compressed")
-    refused(tmp_path, ply_bytes(columns(scale_2=None)), "two scales", layout="3dgs")
-    refused(tmp_path, compressed_bytes(columns()), "packed columns", layout="3dgs")
+    refused(tmp_path, ply_bytes(columns()), "lacks the columns packed_position", layout="supersplat-compressed")
+    refused(tmp_path, ply_bytes(columns(scale_2=None)), "lacks the columns scale_2. Choose one of 2dgs", layout="3dgs")
+    refused(tmp_path, compressed_bytes(columns()), "Choose one of supersplat-compressed", layout="3dgs")
 
 
 def test_compressed_files_whose_elements_do_not_fit_are_refused(tmp_path):

@@ -3,7 +3,8 @@
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QComboBox, QGridLayout, QWidget
 
-from splap_editor.io.layouts import AXIS_NAMES, suiting_layouts
+from splap_editor.io.layout import AXIS_NAMES
+from splap_editor.io.layouts import suiting_layouts
 from splap_editor.io.ply import SplatFile
 from splap_editor.ui.theme import STEP
 from splap_editor.ui.widgets.options_form import form_label
