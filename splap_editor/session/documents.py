@@ -9,6 +9,7 @@ from pathlib import Path
 from splap_editor.io.session_file import content_hash, read_session_file, write_session_file
 from splap_editor.io.session_specs import SessionFile
 from splap_editor.session.jobs import Job, Post, Worker
+from splap_editor.session.latest_job import LatestJob
 from splap_editor.session.saved_state import Look, SavedState, restore_scene, saved_state, session_file_of
 from splap_editor.session.scene import Scene
 from splap_editor.session.scene_follower import SceneFollower
@@ -84,6 +85,8 @@ class Documents:
         self.opened = Signal()
         self.failed = Signal()
         self._session = session
+        self._reading = LatestJob(self.worker, "open", cancels=True)
+        self._hashing = LatestJob(self.worker, "hash", cancels=True)
         self._is_written = threading.Event()
         self._is_written.set()
         self._arrival: _Arrival | None = None
@@ -165,14 +168,13 @@ class Documents:
                 error.open_with = lambda found: self._open(title, read, folder, found)
             self.failed.emit(title, error)
 
-        job = Job("open", title, located, done, failed)
-        self.worker.submit(job, cancels=("open",))
+        self._reading.ask(located, done, failed=failed, title=title)
 
     def _on_scene_changed(self) -> None:
         scene = self._session.scene
         arrival, self._arrival = self._arrival, None
         self._source = source = _Source(scene.file.path)
-        self.worker.submit(Job("hash", "", lambda job: _take_digest(source)), cancels=("hash",))
+        self._hashing.ask(lambda job: _take_digest(source), lambda done: None)
         if arrival is None or arrival.scene is not scene:
             self.path = None
             self._kept = self.state()

@@ -23,7 +23,7 @@ class Job:
     Parameters
     ----------
     kind : str
-        What it does; see `Worker.submit` for how kinds replace each other.
+        What it does, by which it is asked for and cancelled.
     title : str
         As shown beside the progress bar: "Preparing bench.ply".
     function : callable
@@ -100,13 +100,10 @@ class Worker:
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
-    def submit(self, job: Job, *, cancels: tuple[str, ...] = ()) -> Job:
-        """Queue a job; waiting and running jobs of the kinds in ``cancels`` are cancelled first."""
+    def submit(self, job: Job) -> Job:
+        """Queue a job; where only the newest of its kind matters, a `LatestJob` does that."""
         job._worker = self
         with self._wake:
-            for other in (*self._queue, self._running):
-                if other is not None and other.kind in cancels:
-                    other.cancel()
             self._queue.append(job)
             self._wake.notify()
         return job

@@ -1,16 +1,30 @@
-"""Background work of which only the newest request matters."""
+"""The one loop behind all background work of which only the newest request matters."""
 
 from collections.abc import Callable
 from typing import Any
 
 from splap_editor.session.jobs import Job, Worker
 
+Call = Callable[[], None]
+Gate = Callable[[Call], None]
+"""Makes a call on the main thread once the picture is ready for another value."""
+
+
+def at_once(call: Call) -> None:
+    """Keep nothing waiting: the gate where no picture is drawn."""
+    call()
+
 
 class LatestJob:
     """Runs one request at a time; of those made meanwhile only the newest is run after it.
 
-    Unlike cancelling what runs with each request, this shows something while
-    requests keep coming, as in a drag. Only for the main thread.
+    Frames of a drag, the stages of a session, colours and order of a view,
+    previews: all go through here. Only for the main thread. ::
+
+        ask ─▶ waits (the newest) ─▶ runs on the worker ─▶ held at the gate ─▶ done ─▶ the one that waits
+                                     └───────────── busy ────────────┘
+
+    What waits is begun after ``done`` has returned, never from inside it.
 
     Parameters
     ----------
@@ -18,59 +32,128 @@ class LatestJob:
     kind : str
         Kind of its jobs.
     cancels : bool
-        A new request cancels the one that runs, for work that takes long.
+        A new request cancels the one that runs, for work that takes long. Without, something is shown while requests
+        keep coming, as in a drag.
     failed : callable, optional
         Given the error of a request that failed.
+    freed : callable, optional
+        Called when a request has ended, in whatever way, and none waits.
     """
 
     def __init__(
-        self, worker: Worker, kind: str, *, cancels: bool = False, failed: Callable[[Exception], None] | None = None
+        self,
+        worker: Worker,
+        kind: str,
+        *,
+        cancels: bool = False,
+        failed: Callable[[Exception], None] | None = None,
+        freed: Call | None = None,
     ) -> None:
+        self.gate: Gate = at_once
         self._worker = worker
         self._kind = kind
         self._cancels = cancels
-        self._failed = failed
+        self._failed = failed or (lambda error: None)
+        self._freed = freed or _nothing
         self._running: Job | None = None
-        self._waiting: tuple[Callable[[Job], Any], Callable[[Any], None]] | None = None
+        self._is_held = False
+        self._waiting: Call | None = None
+        self._wanted: Any = None
 
     @property
     def is_busy(self) -> bool:
-        """Whether a request runs or waits."""
+        """Whether a request runs, or its value has not been taken yet."""
         return self._running is not None
 
-    def ask(self, function: Callable[[Job], Any], done: Callable[[Any], None]) -> None:
+    @property
+    def wanted(self) -> Any:
+        """What the newest request is for that runs or waits, as told to `ask`; None when none is or it is cancelled."""
+        is_coming = self._waiting is not None or (self._running is not None and not self._running.is_cancelled)
+        return self._wanted if is_coming else None
+
+    def ask(
+        self,
+        function: Callable[[Job], Any],
+        done: Callable[[Any], None],
+        *,
+        failed: Callable[[Exception], None] | None = None,
+        title: str = "",
+        wanted: Any = None,
+    ) -> None:
         """Run ``function(job)`` on the worker and give its value to ``done``, unless a newer request comes first."""
-        if self._running is not None:
-            self._waiting = (function, done)
-            if self._cancels:
-                self._running.cancel()
+        self._wanted = wanted
+        if self._running is None:
+            self._run(function, done, failed or self._failed, title)
             return
+        if self._cancels:
+            self._running.cancel()
+        self._waiting = lambda: self.ask(function, done, failed=failed, title=title, wanted=wanted)
 
-        def finished(value: Any) -> None:
-            # A newer request that has waited is on its way: what it asked for replaces this, soon.
-            self._running = None
-            done(value)
-            self._go_on()
+    def when_free(self, call: Call) -> None:
+        """Make a call now, or once what runs has been taken; of calls and requests that wait only the newest is kept.
 
-        def failed(error: Exception) -> None:
-            self._running = None
-            if self._failed is not None:
-                self._failed(error)
-            self._go_on()
+        For a request that is better put together when its turn comes.
+        """
+        if self._running is None:
+            call()
+        else:
+            self._waiting = call
 
-        self._running = self._worker.submit(Job(self._kind, "", function, finished, failed, self._stopped))
+    def catch_up(self) -> None:
+        """Make the call that waits now, if there is one."""
+        call, self._waiting = self._waiting, None
+        if call is not None:
+            call()
+
+    def forget(self) -> None:
+        """Let go of what waits; what runs goes on."""
+        self._waiting = None
 
     def drop(self) -> None:
-        """Forget what waits and cancel what runs."""
-        self._waiting = None
+        """Forget what waits and cancel what runs: its value is not taken."""
+        self.forget()
         if self._running is not None:
             self._running.cancel()
+            if self._is_held:
+                self._running, self._is_held = None, False
 
-    def _stopped(self) -> None:
-        self._running = None
-        self._go_on()
+    def _run(
+        self,
+        function: Callable[[Job], Any],
+        done: Callable[[Any], None],
+        failed: Callable[[Exception], None],
+        title: str,
+    ) -> None:
+        def made(value: Any) -> None:
+            self._is_held = True
+            self.gate(lambda: taken(value))
 
-    def _go_on(self) -> None:
-        if self._waiting is not None:
-            waiting, self._waiting = self._waiting, None
-            self.ask(*waiting)
+        def taken(value: Any) -> None:
+            if self._running is not job:
+                return  # dropped while it was held
+            self._end(_nothing if job.is_cancelled else lambda: done(value))
+
+        job = Job(
+            self._kind,
+            title,
+            function,
+            made,
+            lambda error: self._end(lambda: failed(error)),
+            lambda: self._end(_nothing),
+        )
+        self._running = self._worker.submit(job)
+
+    def _end(self, tell: Call) -> None:
+        """Tell how a request ended, and go on with what waits even if telling goes wrong."""
+        self._running, self._is_held = None, False
+        try:
+            tell()
+        finally:
+            if self._running is None:
+                self.catch_up()
+            if self._running is None:
+                self._freed()
+
+
+def _nothing() -> None:
+    pass

@@ -30,8 +30,6 @@ class Scene:
         self.preview: Edit | None = None
         self.kernels: AdaptedKernels | None = None
         self.deformation: Deformation | None = None
-        self.presented: object = None
-        self.depicted: object = None
         self.selection = np.zeros(file.splats.n_splats, bool)
         self.hidden = np.zeros(file.splats.n_splats, bool)
         self.selection_sets: Mapping[str, NDArray[np.bool_]] = {}
@@ -81,13 +79,10 @@ class Scene:
         self.preview = edit
         self.preview_changed.emit()
 
-    def set_pose(
-        self, kernels: AdaptedKernels | None, deformation: Deformation | None = None, presented: object = None
-    ) -> None:
-        """Show adapted kernels, or the rest pose; ``presented`` is what the view prepared for them on the worker."""
+    def set_pose(self, kernels: AdaptedKernels | None, deformation: Deformation | None = None) -> None:
+        """Show adapted kernels, or the rest pose."""
         self.kernels = kernels
         self.deformation = deformation
-        self.presented = presented
         self.pose_changed.emit()
 
     def set_selection(self, selection: NDArray[np.bool_]) -> None:

@@ -1,68 +1,206 @@
-"""What the session's jobs do on the worker: a snapshot in, a value out. Nothing here touches a scene on screen."""
+"""What the session's jobs do on the worker: a request in, a value out. Nothing here touches a scene on screen.
 
-from collections.abc import Callable, Mapping
+A request holds on to all that the work needs, so that it may go on while the scene changes.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels, adapted_splats
+from splap_editor.core.deformer import Deformation
 from splap_editor.core.graph.splat_graph import GraphOptions
-from splap_editor.core.splats.occupancy import Ellipses, occupancy_ellipses
-from splap_editor.core.splats.splats import Splats
+from splap_editor.core.splats.occupancy import occupancy_ellipses
 from splap_editor.engine.cache import StageCache
 from splap_editor.engine.edit import Edit
 from splap_editor.engine.export_report import ExportReport, export_report
-from splap_editor.engine.pipeline import Surface, deformer_of, handles_of, surface_of
+from splap_editor.engine.pipeline import Surface, deformer_of, handles_of, kernels_of, surface_of
 from splap_editor.engine.quantities import Snapshot, columns_of
 from splap_editor.io.ply import SplatFile, read_ply, write_ply
 from splap_editor.session.bound_edit import BoundEdit
+from splap_editor.session.depictor import Depictor, HandOver
 from splap_editor.session.jobs import Job
 from splap_editor.session.scene import Scene
 
-Depictor = Callable[[Splats], object]
-"""Prepares what the view needs of a scene that is being opened, such as its shapes."""
+
+@dataclass(frozen=True, eq=False)
+class OpenRequest:
+    """A splat PLY to be shown.
+
+    Parameters
+    ----------
+    path : Path
+    layout : str, optional
+        Read it as this layout instead of the recognised one.
+    restore : callable, optional
+        Puts a saved edit in place, on the worker.
+    depictor : Depictor
+    """
+
+    path: Path
+    layout: str | None
+    restore: Callable[[Scene], None] | None
+    depictor: Depictor
 
 
-def opened_scene(
-    job: Job, path: Path, layout: str | None, depictor: Depictor | None, restore: Callable[[Scene], None] | None
-) -> Scene:
-    """Read a splat PLY and find its ellipses; ``restore`` puts a saved edit in place."""
-    file = read_ply(path, layout=layout, progress=job.progress("reading"))
+@dataclass(frozen=True, eq=False)
+class OpenedScene:
+    """A scene, and what its view needs to draw it."""
+
+    scene: Scene
+    hand_over: HandOver
+
+
+def opened_scene(job: Job, request: OpenRequest) -> OpenedScene:
+    """Read a splat PLY and find its ellipses."""
+    file = read_ply(request.path, layout=request.layout, progress=job.progress("reading"))
     job.report(1.0, "occupancy")
     scene = Scene(file, occupancy_ellipses(file.splats))
-    scene.depicted = depictor(file.splats) if depictor is not None else None
-    if restore is not None:
-        restore(scene)
-    return scene
+    hand_over = request.depictor.depict(file.splats)
+    if request.restore is not None:
+        request.restore(scene)
+    return OpenedScene(scene, hand_over)
 
 
-def prepared_surface(
-    job: Job, splats: Splats, ellipses: Ellipses, options: GraphOptions, cache: StageCache | None, near: Surface | None
-) -> Surface:
-    """Build everything that handles of a scene share, a drag's coarse model included; mends go on from ``near``."""
-    surface = surface_of(splats, options, ellipses=ellipses, cache=cache, stages=job.progress, near=near)
+@dataclass(frozen=True, eq=False)
+class SurfaceRequest:
+    """What all handles of a scene share, wanted with these options; mends go on from the scene's last surface."""
+
+    scene: Scene
+    near: Surface | None
+    options: GraphOptions
+    cache: StageCache | None
+
+
+def prepared_surface(job: Job, request: SurfaceRequest) -> Surface:
+    """Build everything that handles of a scene share, a drag's coarse model included."""
+    scene = request.scene
+    surface = surface_of(
+        scene.splats,
+        request.options,
+        ellipses=scene.ellipses,
+        cache=request.cache,
+        stages=job.progress,
+        near=request.near,
+    )
     job.report(0.0, "coarse model")
     _ = surface.arap_scene.coarse  # made here, so that the first drag need not wait for it
     return surface
 
 
-def bound_edit(job: Job, surface: Surface, edit: Edit, cache: StageCache | None, n_threads: int) -> BoundEdit:
+@dataclass(frozen=True, eq=False)
+class BindRequest:
+    """The deformer of an edit."""
+
+    surface: Surface
+    edit: Edit
+    cache: StageCache | None
+    n_threads: int
+
+
+def bound_edit(job: Job, request: BindRequest) -> BoundEdit:
     """Bind the deformer of an edit."""
-    handles, progress = handles_of(surface, edit), job.progress("binding")
-    made = deformer_of(surface, edit, handles, cache=cache, progress=progress, stages=job.progress, n_threads=n_threads)
+    surface, edit = request.surface, request.edit
+    handles = handles_of(surface, edit)
+    made = deformer_of(
+        surface,
+        edit,
+        handles,
+        cache=request.cache,
+        progress=job.progress("binding"),
+        stages=job.progress,
+        n_threads=request.n_threads,
+    )
     return BoundEdit(edit, handles, made)
 
 
-def exported_file(
-    job: Job,
-    path: Path,
-    file: SplatFile,
-    kernels: AdaptedKernels | None,
-    columns: tuple[str, ...],
-    snapshot: Snapshot,
-    options: Mapping[str, bool],
-) -> ExportReport:
+@dataclass(frozen=True, eq=False)
+class PoseRequest:
+    """The kernels of an edit.
+
+    Parameters
+    ----------
+    surface : Surface
+    bound : BoundEdit
+    edit : Edit
+    present : callable
+        Prepares what a view needs of the kernels.
+    show : callable
+        Given, on the main thread, poses on the way to the settled one.
+    """
+
+    surface: Surface
+    bound: BoundEdit
+    edit: Edit
+    present: Callable[[AdaptedKernels], HandOver]
+    show: Callable[["MadePose"], None]
+
+
+@dataclass(frozen=True, eq=False)
+class MadePose:
+    """Kernels of an edit, how they came about, and what their view needs to draw them."""
+
+    kernels: AdaptedKernels
+    deformation: Deformation
+    hand_over: HandOver
+
+
+def dragged_pose(job: Job, request: PoseRequest) -> MadePose:
+    """Pose at the speed of a drag."""
+    return _made_pose(request, request.bound.deformer.drag(request.edit.transforms))
+
+
+def settled_pose(job: Job, request: PoseRequest) -> MadePose:
+    """Pose to the end, and show how it comes about."""
+
+    def shown(deformation: Deformation) -> None:
+        made = _made_pose(request, deformation)
+        job.deliver(lambda: request.show(made))
+
+    solve = request.bound.deformer.solve
+    return _made_pose(request, solve(request.edit.transforms, progress=job.progress("settling"), shown=shown))
+
+
+def _made_pose(request: PoseRequest, deformation: Deformation) -> MadePose:
+    kernels = kernels_of(request.surface, request.edit, deformation)
+    return MadePose(kernels, deformation, request.present(kernels))
+
+
+@dataclass(frozen=True, eq=False)
+class ExportOrder:
+    """A PLY to be written once the splats have settled.
+
+    Parameters
+    ----------
+    path : Path
+    columns : tuple of str
+        Quantities that become columns of the file.
+    as_3dgs : bool
+        Write the layout of 3D Gaussian splats, whatever the file's own.
+    """
+
+    path: Path
+    columns: tuple[str, ...] = ()
+    as_3dgs: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class ExportRequest:
+    """A file to be written as it is posed."""
+
+    order: ExportOrder
+    scene: Scene
+    edit: Edit
+    file: SplatFile
+    kernels: AdaptedKernels | None
+    snapshot: Snapshot = field(repr=False)
+
+
+def exported_file(job: Job, request: ExportRequest) -> ExportReport:
     """Write a file as it is posed."""
     job.report(0.1, "rotating colours")
+    file, kernels, order = request.file, request.kernels, request.order
     splats = file.splats if kernels is None else adapted_splats(file.splats, kernels)
-    extra = columns_of(columns, snapshot)
-    write_ply(path, file, splats, extra=extra, progress=job.progress("writing"), **options)
-    return export_report(path, file.splats, kernels)
+    extra = columns_of(order.columns, request.snapshot)
+    write_ply(order.path, file, splats, extra=extra, progress=job.progress("writing"), as_3dgs=order.as_3dgs)
+    return export_report(order.path, file.splats, kernels)

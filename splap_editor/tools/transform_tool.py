@@ -32,7 +32,6 @@ class TransformTool:
         self._typed = ""
         self._pointer = (0.0, 0.0)
         self._has_moved = False
-        self._late: PointerEvent | None = None
 
     @property
     def hint(self) -> str:
@@ -87,10 +86,7 @@ class TransformTool:
     def _continue(self, event: PointerEvent) -> bool:
         if event.kind == "move":
             # While a pose is on its way only the newest pointer position matters.
-            if self._context.session.awaits_drag:
-                self._late = event
-            else:
-                self._move(event)
+            self._context.session.drag(lambda: self._move(event))
         elif event.kind == "press" and event.button == "right":
             self.cancel()
         elif (event.kind == "press" and self._by_key and event.button == "left") or (
@@ -101,7 +97,7 @@ class TransformTool:
 
     def _key_while_active(self, event: KeyEvent) -> bool:
         gizmo = self._context.viewport.gizmo
-        self._catch_up()
+        self._context.session.catch_up()
         if event.key == "Escape":
             self.cancel()
         elif event.key in ("Return", "Enter"):
@@ -136,16 +132,10 @@ class TransformTool:
         self._has_moved = False
         viewport.gizmo.begin(part, viewport.projection, *xy)
         viewport.begin_motion()
-        self._context.session.scene.pose_changed.connect(self._catch_up)
-
-    def _catch_up(self) -> None:
-        """Go to where the pointer went while a pose was on its way."""
-        event, self._late = self._late, None
-        if event is not None and self.is_active:
-            self._move(event)
 
     def _move(self, event: PointerEvent) -> None:
-        self._show(self._context.viewport.gizmo.move(*event.xy, fine=event.shift, snap=event.ctrl))
+        if self.is_active:
+            self._show(self._context.viewport.gizmo.move(*event.xy, fine=event.shift, snap=event.ctrl))
 
     def _show(self, delta: NDArray[np.float64]) -> None:
         """Preview every handle of the drag moved by one world transform about their common pivot."""
@@ -172,7 +162,7 @@ class TransformTool:
 
     def _commit(self) -> None:
         viewport = self._context.viewport
-        self._catch_up()
+        self._context.session.catch_up()
         label = _LABELS[viewport.gizmo.dragged.act]
         if len(self._starts) > 1:
             label += "s"
@@ -186,8 +176,6 @@ class TransformTool:
     def _finish(self) -> None:
         self._starts = {}
         self._typed = ""
-        self._late = None
-        self._context.session.scene.pose_changed.disconnect(self._catch_up)
         self._context.hud.clear()
         self._context.viewport.end_motion()
         self._context.viewport.gizmo_changed()

@@ -1,6 +1,6 @@
 """A session shown in a viewport: it follows the scene's signals, and has colours and order made for each view."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,8 @@ from splap_editor.core.splats.rotations import quats_to_matrices
 from splap_editor.core.splats.spherical_harmonics import view_colors
 from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.edit import Handle
-from splap_editor.session.jobs import Job
+from splap_editor.session.depictor import HandOver
+from splap_editor.session.latest_job import LatestJob
 from splap_editor.session.scene import Scene
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
@@ -106,7 +107,7 @@ class SceneView:
     Parameters
     ----------
     session : Session
-        Followed. Its ``presenter`` is set, so that each pose comes with drawing order and colours.
+        Followed. Its ``depictor`` is set, so that each pose comes with drawing order and colours.
     viewport : Viewport
         Where it is drawn.
     """
@@ -116,17 +117,17 @@ class SceneView:
         self._session = session
         self._scene: Scene | None = None
         self._depicted: Depiction | None = None
+        self._depicts: Splats | None = None
+        self._presented: tuple[AdaptedKernels | None, Presented | None] = (None, None)
         self.preferred_up: tuple[float, float, float] | None = None
         self._shows_tints = True
         self._tinted_for: tuple[object, ...] = ()
         self._paints: dict[str, NDArray[np.uint8]] = {}
         self._marks: tuple[tuple[NDArray[np.integer], tuple[int, int, int, int]], ...] = ()
-        self._wants_view = False
-        self._view_job: Job | None = None
+        self._view_job = LatestJob(session.view_worker, "view")
         self._seen = SeenFrom(np.zeros(3), np.array([0.0, 0.0, -1.0], np.float32), False)
         viewport.splats.view_turned = self._on_view_turned
-        session.depictor = depiction
-        session.presenter = lambda kernels: presented(self._depicted, kernels, self._seen)
+        session.depictor = self
         self._follower = SceneFollower(
             session,
             self._on_scene_changed,
@@ -143,8 +144,8 @@ class SceneView:
     def close(self) -> None:
         """Let go of session and viewport."""
         self._follower.close()
-        self._session.presenter = self._session.depictor = None
-        self._scene = None
+        self._session.depictor = self._scene = None
+        self._view_job.drop()
         self.viewport.close()
 
     @property
@@ -202,13 +203,39 @@ class SceneView:
             rings.show("free", loops, FREE_RING_COLOR, opacity=0.8)
         self.viewport.request_render()
 
+    # Preparing on the session's worker ----------------------------------------------------------------------------
+
+    def depict(self, splats: Splats) -> HandOver:
+        """Make shapes and colours of a scene that is being opened."""
+        made = depiction(splats)
+
+        def hand_over() -> None:
+            self._depicted, self._depicts = made, splats
+
+        return hand_over
+
+    def presenter(self) -> Callable[[AdaptedKernels], HandOver]:
+        """Sort and colour kernels of the scene on screen, for the view as it is when they have been made."""
+        depicted = self._depicted
+
+        def present(kernels: AdaptedKernels) -> HandOver:
+            made = presented(depicted, kernels, self._seen)
+
+            def hand_over() -> None:
+                self._presented = kernels, made
+
+            return hand_over
+
+        return present
+
     # Following the scene ------------------------------------------------------------------------------------------
 
     def _on_scene_changed(self) -> None:
         self._scene = scene = self._session.scene
         self._tinted_for, self._paints, self._marks = (), {}, ()
         self.viewport.gizmo.detach()
-        self._depicted = scene.depicted if scene.depicted is not None else depiction(scene.splats)
+        if self._depicts is not scene.splats:
+            self.depict(scene.splats)()
         self.viewport.splats.load(self._depicted.rest, self._depicted.colors)
         self.viewport.camera.world_up = np.array(self.preferred_up or suggested_up(scene.splats))
         self.viewport.reset_camera()
@@ -223,12 +250,13 @@ class SceneView:
         if not self._is_shown:
             return
         scene, splats = self._scene, self.viewport.splats
-        kernels, made = scene.kernels, scene.presented
+        kernels, (presents, made) = scene.kernels, self._presented
         if kernels is None:
             rest = self._depicted.rest
             splats.move(rest.means, rest.axes_u, rest.axes_v)
             self._ask_for_view()
         else:
+            made = made if presents is kernels else None
             order = made.order if made is not None else None
             splats.move(kernels.means_f32, kernels.axes_f32[:, 0], kernels.axes_f32[:, 1], order=order)
             if made is not None and made.colors is not None:
@@ -308,11 +336,14 @@ class SceneView:
         self._ask_for_view()
 
     def _ask_for_view(self) -> None:
-        """Have colours and order made for the present view; while that is under way, the newest view waits."""
-        if self._view_job is not None:
-            self._wants_view = True
+        """Have colours and order made for the view; while that is under way, the view as it is afterwards waits."""
+        self._view_job.when_free(self._present)
+
+    def _present(self) -> None:
+        scene = self._scene
+        if scene is None:
             return
-        scene, kernels, seen, depicted = self._scene, self._scene.kernels, self._seen, self._depicted
+        kernels, seen, depicted = scene.kernels, self._seen, self._depicted
 
         def done(made: Presented) -> None:
             if self._scene is scene and scene.kernels is kernels and self._is_shown:
@@ -320,16 +351,8 @@ class SceneView:
                     self.viewport.splats.set_order(made.order)
                 if made.colors is not None:
                     self.viewport.splats.set_colors(made.colors)
-            finished()
 
-        def finished(*_: object) -> None:
-            self._view_job = None
-            if self._wants_view and self._scene is not None:
-                self._wants_view = False
-                self._ask_for_view()
-
-        job = Job("view", "", lambda job: presented(depicted, kernels, seen), done, finished, finished)
-        self._view_job = self._session.view_worker.submit(job)
+        self._view_job.ask(lambda job: presented(depicted, kernels, seen), done)
 
 
 def _center(handle: Handle) -> NDArray[np.float64]:

@@ -81,7 +81,8 @@ def test_a_waiting_job_that_is_cancelled_never_runs(main, worker):
     gate, ran, results = threading.Event(), [], []
     worker.submit(Job("gate", "", lambda job: gate.wait(20)))
     worker.submit(Job("old", "", lambda job: ran.append("old")))
-    worker.submit(Job("new", "", lambda job: "new", done=results.append), cancels=("old",))
+    worker.submit(Job("new", "", lambda job: "new", done=results.append))
+    worker.cancel("old")
     gate.set()
     main.run_until(lambda: results)
     assert ran == []

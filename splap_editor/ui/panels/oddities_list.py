@@ -5,7 +5,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
 from splap_editor.session.detective import Oddity, oddities
-from splap_editor.session.jobs import Job
+from splap_editor.session.latest_job import LatestJob
 from splap_editor.session.scene import Scene
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
@@ -27,6 +27,8 @@ class OdditiesList(QWidget):
         self.status = QLabel()
         self.status.setProperty("tone", "quiet")
         self._list.addWidget(self.status)
+        # A scene that is gone need not be looked through to the end.
+        self._search = LatestJob(session.detail_worker, "lint", cancels=True)
         SceneFollower(session, self._on_scene_changed)
 
     def _on_scene_changed(self) -> None:
@@ -41,10 +43,7 @@ class OdditiesList(QWidget):
         def failed(error: Exception) -> None:
             self.status.setText(f"The splats could not be looked through: {error}")
 
-        # A scene that is gone need not be looked through to the end.
-        self._session.detail_worker.submit(
-            Job("lint", "", lambda job: oddities(splats, ellipses), done, failed), cancels=("lint",)
-        )
+        self._search.ask(lambda job: oddities(splats, ellipses), done, failed=failed)
 
     def _show(self, scene: Scene, found: list[Oddity] | None) -> None:
         self.found = found

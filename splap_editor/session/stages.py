@@ -1,0 +1,332 @@
+"""What a session does in the background, as a table of stages: file → surface → bound handles → pose → file."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from splap_editor.engine.cache import StageCache
+from splap_editor.engine.edit import Edit, binds_like, poses_like
+from splap_editor.engine.export_report import ExportReport
+from splap_editor.engine.pipeline import Surface
+from splap_editor.session.bound_edit import BoundEdit, snapshot_of
+from splap_editor.session.depictor import Depictor, Unseen
+from splap_editor.session.jobs import Job
+from splap_editor.session.scene import Scene
+from splap_editor.session.work import (
+    BindRequest,
+    ExportOrder,
+    ExportRequest,
+    MadePose,
+    OpenedScene,
+    OpenRequest,
+    PoseRequest,
+    SurfaceRequest,
+    bound_edit,
+    dragged_pose,
+    exported_file,
+    opened_scene,
+    prepared_surface,
+    settled_pose,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Posed:
+    """Whose kernels are on screen: an edit's as it settled, or a frame of its drag."""
+
+    edit: Edit
+    is_settled: bool
+
+
+@dataclass(eq=False)
+class Ledger:
+    """What is asked for, and what has been made of it so far. Only for the main thread.
+
+    Parameters
+    ----------
+    scene : Scene, optional
+        On screen, with the edit that is asked for and the surface made for it.
+    opening : OpenRequest, optional
+        The file that is asked for in its place.
+    exports : tuple of ExportOrder
+        Files to be written, in this order, once the splats have settled.
+    bound : BoundEdit, optional
+        The deformer in use.
+    posed : Posed, optional
+        What ``scene.kernels`` belong to.
+    exported : Edit, optional
+        The edit last exported.
+    given_up : Edit, optional
+        An edit that failed; it is left until another is asked for.
+    is_halted : bool
+        Nothing more is made for the scene until the person says so.
+    """
+
+    cache: StageCache | None = None
+    n_threads: int = 4
+    depictor: Depictor = field(default_factory=Unseen)
+    scene: Scene | None = None
+    opening: OpenRequest | None = None
+    exports: tuple[ExportOrder, ...] = ()
+    bound: BoundEdit | None = None
+    posed: Posed | None = None
+    exported: Edit | None = None
+    given_up: Edit | None = None
+    is_halted: bool = False
+    state: str = "empty"
+
+    @property
+    def is_dragging(self) -> bool:
+        """Whether an edit is on screen that is not in the history yet."""
+        return self.scene.preview is not None
+
+    @property
+    def is_posed(self) -> bool:
+        """Whether the kernels on screen are those of the edit on screen: settled, or the newest frame of a drag."""
+        posed, edit = self.posed, self.scene.shown_edit
+        is_far_enough = posed is not None and (posed.is_settled or self.is_dragging)
+        return is_far_enough and binds_like(posed.edit, edit) and poses_like(posed.edit, edit)
+
+    @property
+    def state_at_rest(self) -> str:
+        """What to say once nothing is left to be made."""
+        if not self.scene.shown_edit.active_handles:
+            return "ready"
+        return "dragging" if self.is_dragging else "settled"
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One kind of background work.
+
+    Parameters
+    ----------
+    name : str
+        Kind of its jobs.
+    needs : callable
+        ``needs(ledger)``: whether it is called for, given that the stages before it are up to date.
+    is_current : callable
+        ``is_current(ledger)``: whether what it makes is there already.
+    state : callable
+        ``state(ledger)``: what the session says meanwhile.
+    cancels : tuple of str
+        Stages whose work is of no use once this one starts.
+    request : callable
+        ``request(ledger)``: what is missing, with all that making it takes.
+    serves : callable
+        ``serves(a, b)``: whether what is made for one request serves another just as well.
+    make : callable, optional
+        ``make(job, request)`` on the worker; without, there is nothing to wait for.
+    take : callable
+        ``take(ledger, request, made)`` puts what was made in its place.
+    fail : callable
+        ``fail(ledger, request)`` stops asking for what could not be made.
+    title : callable
+        ``title(request)``, as shown beside the progress bar and in front of an error.
+    is_told : bool
+        Shown in the progress bar; frames of a drag come and go too fast for that.
+    awaits : tuple of str
+        Stages whose value is taken first if it is on its way.
+    """
+
+    name: str
+    needs: Callable[[Ledger], bool]
+    is_current: Callable[[Ledger], bool]
+    state: Callable[[Ledger], str]
+    cancels: tuple[str, ...]
+    take: Callable[[Ledger, Any, Any], None]
+    request: Callable[[Ledger], Any] = lambda ledger: None
+    serves: Callable[[Any, Any], bool] = lambda a, b: a is b
+    make: Callable[[Job, Any], Any] | None = None
+    fail: Callable[[Ledger, Any], None] = lambda ledger, request: None
+    title: Callable[[Any], str] = lambda request: ""
+    is_told: bool = True
+    awaits: tuple[str, ...] = ()
+
+
+# What each stage asks for ---------------------------------------------------------------------------------------------
+
+
+def _surface_request(ledger: Ledger) -> SurfaceRequest:
+    scene = ledger.scene
+    return SurfaceRequest(scene, scene.surface, scene.shown_edit.graph, ledger.cache)
+
+
+def _bind_request(ledger: Ledger) -> BindRequest:
+    return BindRequest(ledger.scene.surface, ledger.scene.shown_edit, ledger.cache, ledger.n_threads)
+
+
+def _pose_request(ledger: Ledger) -> PoseRequest:
+    scene = ledger.scene
+    return PoseRequest(
+        scene.surface,
+        ledger.bound,
+        scene.shown_edit,
+        ledger.depictor.presenter(),
+        lambda made: _show_pose(scene, made),
+    )
+
+
+def _export_request(ledger: Ledger) -> ExportRequest:
+    scene = ledger.scene
+    snapshot = snapshot_of(scene, ledger.bound)
+    return ExportRequest(ledger.exports[0], scene, scene.edit, scene.file, scene.kernels, snapshot)
+
+
+# Where what was made goes ---------------------------------------------------------------------------------------------
+
+
+def _take_scene(ledger: Ledger, request: OpenRequest, opened: OpenedScene) -> None:
+    opened.hand_over()
+    ledger.scene = opened.scene
+    ledger.bound = ledger.posed = ledger.given_up = ledger.exported = ledger.opening = None
+    ledger.exports = ()
+    ledger.is_halted = False
+
+
+def _take_surface(ledger: Ledger, request: SurfaceRequest, surface: Surface) -> None:
+    ledger.bound = ledger.posed = None
+    request.scene.set_surface(surface)
+
+
+def _take_bound(ledger: Ledger, request: BindRequest, bound: BoundEdit) -> None:
+    ledger.bound, ledger.posed = bound, None
+
+
+def _take_pose(ledger: Ledger, request: PoseRequest, made: MadePose, *, is_settled: bool) -> None:
+    ledger.posed = Posed(request.edit, is_settled)
+    _show_pose(ledger.scene, made)
+
+
+def _show_pose(scene: Scene, made: MadePose) -> None:
+    made.hand_over()
+    scene.set_pose(made.kernels, made.deformation)
+
+
+def _take_rest(ledger: Ledger, request: None, made: None) -> None:
+    ledger.bound = ledger.posed = None
+    if ledger.scene.kernels is not None:
+        ledger.scene.set_pose(None)
+
+
+def _take_export(ledger: Ledger, request: ExportRequest, report: ExportReport) -> None:
+    _forget_export(ledger, request)
+    if ledger.scene is request.scene:
+        ledger.exported = request.edit
+
+
+# What is given up with what failed ------------------------------------------------------------------------------------
+
+
+def _forget_file(ledger: Ledger, request: OpenRequest) -> None:
+    ledger.opening = None
+
+
+def _give_up(ledger: Ledger, request: object) -> None:
+    ledger.given_up = ledger.scene.shown_edit
+
+
+def _forget_export(ledger: Ledger, request: ExportRequest) -> None:
+    ledger.exports = tuple(order for order in ledger.exports if order is not request.order)
+
+
+def _has_handles(ledger: Ledger) -> bool:
+    return bool(ledger.scene.shown_edit.active_handles)
+
+
+def _pose_like(a: PoseRequest, b: PoseRequest) -> bool:
+    return a.bound is b.bound and binds_like(a.edit, b.edit) and poses_like(a.edit, b.edit)
+
+
+STAGES = (
+    Stage(
+        "open",
+        needs=lambda ledger: ledger.opening is not None,
+        is_current=lambda ledger: False,
+        state=lambda ledger: ledger.state,
+        cancels=("prepare", "bind", "pose", "drag"),
+        request=lambda ledger: ledger.opening,
+        make=opened_scene,
+        take=_take_scene,
+        fail=_forget_file,
+        title=lambda request: f"Opening {request.path.name}",
+    ),
+    Stage(
+        "prepare",
+        needs=lambda ledger: True,
+        is_current=lambda ledger: (
+            ledger.scene.surface is not None and ledger.scene.surface.options == ledger.scene.shown_edit.graph
+        ),
+        state=lambda ledger: "preparing",
+        cancels=("bind", "pose", "drag"),
+        request=_surface_request,
+        serves=lambda a, b: a.scene is b.scene and a.options == b.options,
+        make=prepared_surface,
+        take=_take_surface,
+        fail=_give_up,
+        title=lambda request: f"Preparing {request.scene.file.path.name}",
+    ),
+    Stage(
+        "rest",
+        needs=lambda ledger: not _has_handles(ledger),
+        is_current=lambda ledger: False,
+        state=lambda ledger: "ready",
+        cancels=("bind", "pose", "drag"),
+        take=_take_rest,
+    ),
+    Stage(
+        "bind",
+        needs=_has_handles,
+        is_current=lambda ledger: ledger.bound is not None and binds_like(ledger.bound.edit, ledger.scene.shown_edit),
+        state=lambda ledger: "binding",
+        cancels=("pose", "drag"),
+        request=_bind_request,
+        serves=lambda a, b: a.surface is b.surface and binds_like(a.edit, b.edit),
+        make=bound_edit,
+        take=_take_bound,
+        fail=_give_up,
+        title=lambda request: "Binding handles",
+    ),
+    Stage(
+        "drag",
+        needs=lambda ledger: _has_handles(ledger) and ledger.is_dragging,
+        is_current=lambda ledger: ledger.is_posed,
+        state=lambda ledger: "dragging",
+        cancels=("pose",),
+        awaits=("drag",),
+        request=_pose_request,
+        make=dragged_pose,
+        take=lambda ledger, request, made: _take_pose(ledger, request, made, is_settled=False),
+        fail=_give_up,
+        title=lambda request: "Moving the handle",
+        is_told=False,
+    ),
+    Stage(
+        "pose",
+        needs=lambda ledger: _has_handles(ledger) and not ledger.is_dragging,
+        is_current=lambda ledger: ledger.is_posed,
+        state=lambda ledger: "settling",
+        cancels=(),
+        awaits=("drag",),
+        request=_pose_request,
+        serves=_pose_like,
+        make=settled_pose,
+        take=lambda ledger, request, made: _take_pose(ledger, request, made, is_settled=True),
+        fail=_give_up,
+        title=lambda request: "Settling",
+    ),
+    Stage(
+        "export",
+        needs=lambda ledger: bool(ledger.exports) and not ledger.is_dragging,
+        is_current=lambda ledger: False,
+        state=lambda ledger: ledger.state_at_rest,
+        cancels=(),
+        awaits=("export",),
+        request=_export_request,
+        make=exported_file,
+        take=_take_export,
+        fail=_forget_export,
+        title=lambda request: f"Exporting {request.order.path.name}",
+    ),
+)
+"""In the order in which they build on each other: the first that is called for and not current is made next."""
