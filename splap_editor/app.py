@@ -1,5 +1,6 @@
 """The composition root: every part of the window is made and wired here."""
 
+import ctypes
 import os
 import sys
 import traceback
@@ -14,6 +15,7 @@ from PySide6.QtGui import QSurfaceFormat
 from PySide6.QtWidgets import QApplication
 
 from splap_editor.engine.cache import StageCache
+from splap_editor.installation.desktop_entry import APP_ID
 from splap_editor.session.autosave import Autosave
 from splap_editor.session.documents import Documents
 from splap_editor.session.jobs import Job
@@ -67,8 +69,10 @@ def run(path: Path | None = None) -> int:
         Exit code.
     """
     QSurfaceFormat.setDefaultFormat(surface_format())
-    app = QApplication.instance() or QApplication(sys.argv[:1])
-    QCoreApplication.setOrganizationName("splap-editor")
+    _tell_taskbar()
+    app = QApplication.instance() or QApplication([APP_ID])
+    app.setDesktopFileName(APP_ID)
+    QCoreApplication.setOrganizationName(APP_ID)
     QCoreApplication.setApplicationName("SpLap Editor")
     apply_theme(app)
     window = make_window()
@@ -80,6 +84,12 @@ def run(path: Path | None = None) -> int:
     window.recovery_bar.look()
     QTimer.singleShot(0, lambda: _open_first(window, path or sample_path()))
     return app.exec()
+
+
+def _tell_taskbar() -> None:
+    """Let Windows show this program's icon and group its windows, rather than Python's."""
+    if sys.platform == "win32":
+        ctypes.windll.shell32.SetCurrentProcessExplicitAppUserModelID(APP_ID)
 
 
 def make_window(cache: StageCache | None = None) -> MainWindow:

@@ -10,6 +10,7 @@ from pathlib import Path
 import splap_editor
 from splap_editor.core.graph.options import EDGE_OPTIONS, GraphOptions
 from splap_editor.core.options import options_of
+from splap_editor.installation import commands as installation
 from splap_editor.stage_report import StageReport
 
 EXIT_OK, EXIT_REFUSED = 0, 2
@@ -90,6 +91,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_options(graph, GraphOptions, EDGE_OPTIONS)
     _add_output(graph)
     graph.set_defaults(run=_graph)
+    installation.add_commands(commands)
     return parser
 
 
@@ -134,14 +136,20 @@ def _add_output(parser: argparse.ArgumentParser) -> None:
 
 
 def _edit(options: argparse.Namespace) -> int:
+    from splap_editor.installation.readiness import WindowCheck
+
+    check = WindowCheck()
     from splap_editor.app import run
 
+    check.finish()
     return run(options.file)
 
 
 def _render(options: argparse.Namespace) -> int:
     from splap_editor.frames_cli import render
+    from splap_editor.installation.readiness import check_picture
 
+    check_picture()
     return render(options)
 
 
@@ -261,7 +269,7 @@ def _graph(options: argparse.Namespace) -> int:
     return EXIT_OK
 
 
-_COMMANDS = ("edit", "deform", "render", "info", "graph")
+_COMMANDS = ("edit", "deform", "render", "info", "graph", *installation.NAMES)
 
 
 def _readable(info: dict, indent: str = "") -> str:

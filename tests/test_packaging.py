@@ -25,8 +25,8 @@ def test_the_wheel_carries_the_resources_where_the_program_looks_for_them():
     wheel = PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]
     assert wheel["packages"] == ["splap_editor"]
     # The pictures of the README stay out of the wheel.
-    folders = ("icons", "samples", "shaders")
-    assert wheel["force-include"] == {f"resources/{name}": f"splap_editor/_resources/{name}" for name in folders}
+    names = ("icons", "samples", "shaders", "system-packages.txt")
+    assert wheel["force-include"] == {f"resources/{name}": f"splap_editor/_resources/{name}" for name in names}
 
 
 @pytest.mark.parametrize("name", ["bench_2dgs.ply", "windmill_2dgs.ply", "tube.ply", "coil.ply", "README.txt"])
