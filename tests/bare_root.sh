@@ -17,7 +17,11 @@ log=$(mktemp -d)
 xvfb=
 window=
 cleanup() {
-    [ -z "$window" ] || kill -- "-$window" 2>/dev/null || true
+    if [ -n "$window" ]; then
+        kill -- "-$window" 2>/dev/null || true
+        # What the window started may still be compiling; nothing may hold the root when it is taken down.
+        while kill -0 -- "-$window" 2>/dev/null; do sleep 0.2; done
+    fi
     [ -z "$xvfb" ] || kill "$xvfb" 2>/dev/null || true
     for place in tmp/.X11-unix dev proc; do
         mountpoint -q "$root/$place" && umount "$root/$place"
