@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from splap_editor.core.graph.ellipse_offset import normal_offsets, touch_scales
 from splap_editor.core.graph.splat_graph import SplatGraph
+from splap_editor.core.index_spaces import FileRow, RowPair
 from splap_editor.core.splats.occupancy import Ellipses, InertReason
 from splap_editor.core.splats.splats import Splats
 
@@ -27,7 +28,7 @@ class SplatCard:
 
     Parameters
     ----------
-    row : int
+    row : FileRow
         In the file.
     opacity : float
     threshold : float, optional
@@ -41,7 +42,7 @@ class SplatCard:
     n_components : int, optional
     """
 
-    row: int
+    row: FileRow
     opacity: float
     threshold: float | None
     inert: str
@@ -52,7 +53,7 @@ class SplatCard:
     n_components: int | None = None
 
 
-def splat_card(splats: Splats, ellipses: Ellipses, graph: SplatGraph | None, row: int) -> SplatCard:
+def splat_card(splats: Splats, ellipses: Ellipses, graph: SplatGraph | None, row: FileRow) -> SplatCard:
     """Gather the facts of the splat in a file row."""
     threshold = None if splats.thresholds is None else float(splats.thresholds[row])
     inert = INERT_WORDS[InertReason(int(ellipses.inert[row]))]
@@ -92,7 +93,7 @@ class EdgeCard:
         Touch scale at that tolerance.
     """
 
-    rows: tuple[int, int]
+    rows: RowPair
     length: float
     offsets: tuple[float, float]
     epsilon: float
@@ -104,7 +105,7 @@ class EdgeCard:
         return min(self.offsets) <= self.epsilon
 
 
-def edge_card(ellipses: Ellipses, rows: tuple[int, int], epsilon: float) -> EdgeCard:
+def edge_card(ellipses: Ellipses, rows: RowPair, epsilon: float) -> EdgeCard:
     """Measure a pair of splats at a tolerance in units of the scene scale.
 
     Raises
@@ -126,7 +127,7 @@ def edge_card(ellipses: Ellipses, rows: tuple[int, int], epsilon: float) -> Edge
     )
 
 
-def has_edge(ellipses: Ellipses, graph: SplatGraph, rows: tuple[int, int]) -> bool:
+def has_edge(ellipses: Ellipses, graph: SplatGraph, rows: RowPair) -> bool:
     """Whether the graph joins two file rows."""
     a, b = (int(node) for node in ellipses.node_of_row[np.array(rows)])
     if a < 0 or b < 0:

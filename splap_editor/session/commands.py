@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.index_spaces import FileMask
 from splap_editor.engine.edit import Edit
 from splap_editor.session.scene import Scene
 
@@ -46,7 +47,7 @@ class ChangeEdit:
 class ChangeMask:
     """The selection or the hidden splats changed; the masks are kept eight splats to a byte."""
 
-    def __init__(self, scene: Scene, name: str, after: NDArray[np.bool_], label: str) -> None:
+    def __init__(self, scene: Scene, name: str, after: FileMask, label: str) -> None:
         self.label = label
         self._scene = scene
         self._name = name
@@ -74,7 +75,7 @@ class ChangeMask:
 class ChangeSelectionSets:
     """A selection was kept by name, or forgotten."""
 
-    def __init__(self, scene: Scene, after: Mapping[str, NDArray[np.bool_]], label: str) -> None:
+    def __init__(self, scene: Scene, after: Mapping[str, FileMask], label: str) -> None:
         self.label = label
         self._scene = scene
         self._before = scene.selection_sets

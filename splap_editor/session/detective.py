@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from splap_editor.core.index_spaces import FileRows
 from splap_editor.core.splats.occupancy import Ellipses, InertReason
 from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.scene_info import flatness
@@ -28,7 +28,7 @@ class Oddity:
     """
 
     sentence: str
-    rows: NDArray[np.int64]
+    rows: FileRows
 
 
 def oddities(splats: Splats, ellipses: Ellipses) -> list[Oddity]:
@@ -52,7 +52,7 @@ def oddities(splats: Splats, ellipses: Ellipses) -> list[Oddity]:
     return found
 
 
-def round_rows(splats: Splats) -> NDArray[np.int64]:
+def round_rows(splats: Splats) -> FileRows:
     """File rows of the splats whose smallest scale is nearly as large as their middle one."""
     if splats.n_scales == 2:
         return np.zeros(0, np.int64)

@@ -9,9 +9,8 @@ from scipy.spatial import cKDTree
 
 from splap_editor.core.graph.ellipse_offset import touch_scales
 from splap_editor.core.graph.splat_graph import GraphOptions, SplatGraph
+from splap_editor.core.index_spaces import FileMask, FileRows, Nodes, RowPair
 from splap_editor.core.splats.occupancy import Ellipses
-
-Pairs = NDArray[np.int64]
 
 N_CANDIDATES = 12
 """Nearest centres on the other side among which a splat looks for its best contact."""
@@ -26,23 +25,21 @@ N_LINKS = 3
 """Best contacts by which a fragment is tied: one alone would let it turn freely."""
 
 
-def with_cut(options: GraphOptions, pairs: Iterable[tuple[int, int]]) -> GraphOptions:
+def with_cut(options: GraphOptions, pairs: Iterable[RowPair]) -> GraphOptions:
     """Cut edges between file rows; one that was added by hand is merely taken back."""
     pairs, add = _sorted_pairs(pairs), _sorted_pairs(options.add)
     cut = tuple(sorted(_sorted_pairs(options.cut) | (pairs - add)))
     return replace(options, cut=cut, add=tuple(sorted(add - pairs)))
 
 
-def with_added(options: GraphOptions, pairs: Iterable[tuple[int, int]]) -> GraphOptions:
+def with_added(options: GraphOptions, pairs: Iterable[RowPair]) -> GraphOptions:
     """Add edges between file rows; one that was cut by hand is merely put back."""
     pairs, cut = _sorted_pairs(pairs), _sorted_pairs(options.cut)
     add = tuple(sorted(_sorted_pairs(options.add) | (pairs - cut)))
     return replace(options, cut=tuple(sorted(cut - pairs)), add=add)
 
 
-def edges_between(
-    ellipses: Ellipses, graph: SplatGraph, first: NDArray[np.bool_], second: NDArray[np.bool_]
-) -> list[tuple[int, int]]:
+def edges_between(ellipses: Ellipses, graph: SplatGraph, first: FileMask, second: FileMask) -> list[RowPair]:
     """Edges with one end in each of two masks (N,) over file rows, as pairs of rows."""
     rows = ellipses.rows[graph.edges]
     ends = first[rows], second[rows]
@@ -50,9 +47,7 @@ def edges_between(
     return _as_pairs(rows[crossing])
 
 
-def best_links(
-    ellipses: Ellipses, epsilon: float, first: NDArray[np.bool_], second: NDArray[np.bool_]
-) -> list[tuple[int, int]]:
+def best_links(ellipses: Ellipses, epsilon: float, first: FileMask, second: FileMask) -> list[RowPair]:
     """Contacts by which two selections are best joined.
 
     Each splat of one side ranks its nearest centres on the other by touch
@@ -69,7 +64,7 @@ def best_links(
 
     Returns
     -------
-    list of (int, int)
+    list of RowPair
         File rows; empty if a side has no active splat.
     """
     a = np.flatnonzero(first[ellipses.rows])
@@ -93,7 +88,7 @@ def fragments(graph: SplatGraph) -> NDArray[np.int64]:
     return small[small > 0]
 
 
-def fragment_links(ellipses: Ellipses, graph: SplatGraph, epsilon: float) -> tuple[list[tuple[int, int]], int]:
+def fragment_links(ellipses: Ellipses, graph: SplatGraph, epsilon: float) -> tuple[list[RowPair], int]:
     """Contacts that tie each fragment to what is around it.
 
     Parameters
@@ -105,7 +100,7 @@ def fragment_links(ellipses: Ellipses, graph: SplatGraph, epsilon: float) -> tup
 
     Returns
     -------
-    pairs : list of (int, int)
+    pairs : list of RowPair
         File rows: up to three best contacts of each fragment with components that are none.
     n_left : int
         Fragments too far from everything to be joined.
@@ -128,21 +123,21 @@ def fragment_links(ellipses: Ellipses, graph: SplatGraph, epsilon: float) -> tup
     return _as_pairs(ellipses.rows[pairs[chosen]]), len(small) - len(starts)
 
 
-def _near_pairs(ellipses: Ellipses, a: NDArray[np.int64], b: NDArray[np.int64]) -> Pairs:
+def _near_pairs(ellipses: Ellipses, a: Nodes, b: Nodes) -> Nodes:
     """(P, 2) each node of a with its nearest ones of b."""
     k = min(N_CANDIDATES, len(b))
     near = cKDTree(ellipses.centers[b]).query(ellipses.centers[a], k=k)[1].reshape(len(a), k)
     return np.stack([np.repeat(a, k), b[near.ravel()]], axis=1)
 
 
-def _by_contact(ellipses: Ellipses, pairs: Pairs, epsilon: float) -> NDArray[np.int64]:
+def _by_contact(ellipses: Ellipses, pairs: Nodes, epsilon: float) -> NDArray[np.int64]:
     """Order of pairs by touch scale, those that never touch by distance after all others."""
     scales = touch_scales(ellipses, pairs, epsilon * ellipses.scene_scale)
     apart = np.linalg.norm(ellipses.centers[pairs[:, 0]] - ellipses.centers[pairs[:, 1]], axis=1)
     return np.lexsort((pairs[:, 1], pairs[:, 0], apart, scales))
 
 
-def _as_pairs(rows: NDArray[np.integer]) -> list[tuple[int, int]]:
+def _as_pairs(rows: FileRows) -> list[RowPair]:
     return sorted(_sorted_pairs(rows.tolist()))
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.graph.splat_graph import SplatGraph
+from splap_editor.core.index_spaces import Node, Nodes
 from splap_editor.core.splats.occupancy import Ellipses
 from splap_editor.core.surface.geodesics import Neighborhoods, geodesic_distances
 
@@ -31,22 +32,22 @@ class NeighborComparison:
     common, only_first, only_second : (M,) int64
     """
 
-    first: NDArray[np.int64]
-    second: NDArray[np.int64]
-    common: NDArray[np.int64]
-    only_first: NDArray[np.int64]
-    only_second: NDArray[np.int64]
+    first: Nodes
+    second: Nodes
+    common: Nodes
+    only_first: Nodes
+    only_second: Nodes
 
 
-def compared(first: NDArray[np.int64], second: NDArray[np.int64]) -> NeighborComparison:
+def compared(first: Nodes, second: Nodes) -> NeighborComparison:
     """Sort two sets of nodes into what they share and what only one has."""
     shared = np.isin(first, second)
     return NeighborComparison(first, second, first[shared], first[~shared], second[~np.isin(second, first)])
 
 
 def neighbor_set(
-    kind: str, node: int, ellipses: Ellipses, graph: SplatGraph, neighborhoods: Neighborhoods, *, k: int = 10
-) -> NDArray[np.int64]:
+    kind: str, node: Node, ellipses: Ellipses, graph: SplatGraph, neighborhoods: Neighborhoods, *, k: int = 10
+) -> Nodes:
     """Neighbours of a node by one of four answers.
 
     Parameters
@@ -57,7 +58,7 @@ def neighbor_set(
         ``"euclidean"``: the k nearest centres.
         ``"mahalanobis"``: the k least ``d² = (p_j - p_i)ᵀ Σ_i⁻¹ (p_j - p_i)`` with the splat's own covariance, its
         thickness set to a tenth of the smaller of its other standard deviations as the comparison in [1]_ does.
-    node : int
+    node : Node
     ellipses : Ellipses
     graph : SplatGraph
     neighborhoods : Neighborhoods
@@ -102,7 +103,7 @@ def neighbor_set(
     raise ValueError(f"kind must be one of {', '.join(NEIGHBOR_KINDS)}, got {kind!r}")
 
 
-def _nearest(distances: NDArray[np.float64], node: int, k: int) -> NDArray[np.int64]:
+def _nearest(distances: NDArray[np.float64], node: Node, k: int) -> Nodes:
     """Indices of the k least finite distances but the node's own."""
     distances = distances.copy()
     distances[node] = np.inf

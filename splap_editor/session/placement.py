@@ -1,17 +1,17 @@
 """Where a new handle or pin goes: a disc on the surface, held at the pose it has on screen."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from splap_editor.core.arap.rotation_fit import fit_rotations
 from splap_editor.core.handle_nodes import Region
+from splap_editor.core.index_spaces import FileRow, FileRows
 from splap_editor.core.splats.rotations import matrices_to_quats
 from splap_editor.core.surface.geodesics import geodesic_distances
 from splap_editor.engine.edit import Pose
 from splap_editor.session.scene import Scene
 
 
-def disc_rows(scene: Scene, row: int, radius: float) -> NDArray[np.int64]:
+def disc_rows(scene: Scene, row: FileRow, radius: float) -> FileRows:
     """File rows of the active splats within a geodesic radius of one.
 
     Measured along the splat graph, so a disc on one slat does not reach the
@@ -20,7 +20,7 @@ def disc_rows(scene: Scene, row: int, radius: float) -> NDArray[np.int64]:
     Parameters
     ----------
     scene : Scene
-    row : int
+    row : FileRow
         The splat in the middle; an inert one gives itself alone.
     radius : float
         World units.
@@ -41,7 +41,7 @@ def disc_rows(scene: Scene, row: int, radius: float) -> NDArray[np.int64]:
     return np.sort(ellipses.rows[near])
 
 
-def rows_region(scene: Scene, rows: NDArray[np.int64]) -> Region:
+def rows_region(scene: Scene, rows: FileRows) -> Region:
     """Region of given file rows about the mean of their rest positions, as a recipe has it."""
     rows = np.unique(np.asarray(rows, np.int64))
     return Region(np.asarray(scene.splats.means, np.float64)[rows].mean(axis=0), 0.0, rows)

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from splap_editor.core.index_spaces import FileMask
 from splap_editor.engine.edit import Edit
 from splap_editor.engine.pose import Pose
 from splap_editor.engine.recipe_edit import edit_of, recipe_of
@@ -45,9 +45,9 @@ class SavedState:
     n_splats: int
     edit: Edit
     active_handles: tuple[int, ...]
-    selection: NDArray[np.bool_]
-    hidden: NDArray[np.bool_]
-    selection_sets: Mapping[str, NDArray[np.bool_]]
+    selection: FileMask
+    hidden: FileMask
+    selection_sets: Mapping[str, FileMask]
     look: Look
 
     def keeps_like(self, other: "SavedState") -> bool:

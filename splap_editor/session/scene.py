@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
 from splap_editor.core.deformer import Deformation
+from splap_editor.core.index_spaces import FileMask, FileRow
 from splap_editor.core.splats.occupancy import Ellipses
 from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.edit import Edit
@@ -32,9 +33,9 @@ class Scene:
         self.deformation: Deformation | None = None
         self.selection = np.zeros(file.splats.n_splats, bool)
         self.hidden = np.zeros(file.splats.n_splats, bool)
-        self.selection_sets: Mapping[str, NDArray[np.bool_]] = {}
+        self.selection_sets: Mapping[str, FileMask] = {}
         self.active_handles: tuple[int, ...] = ()
-        self.picked: int | None = None
+        self.picked: FileRow | None = None
         self.surface_changed = Signal()
         self.edit_changed = Signal()
         self.preview_changed = Signal()
@@ -85,17 +86,17 @@ class Scene:
         self.deformation = deformation
         self.pose_changed.emit()
 
-    def set_selection(self, selection: NDArray[np.bool_]) -> None:
+    def set_selection(self, selection: FileMask) -> None:
         """Replace the (N,) selection mask."""
         self.selection = selection
         self.selection_changed.emit()
 
-    def set_hidden(self, hidden: NDArray[np.bool_]) -> None:
+    def set_hidden(self, hidden: FileMask) -> None:
         """Replace the (N,) mask of splats that are neither drawn nor picked."""
         self.hidden = hidden
         self.hidden_changed.emit()
 
-    def set_selection_sets(self, sets: Mapping[str, NDArray[np.bool_]]) -> None:
+    def set_selection_sets(self, sets: Mapping[str, FileMask]) -> None:
         """Replace the selections kept by name, each an (N,) mask."""
         self.selection_sets = sets
         self.selection_sets_changed.emit()
@@ -106,7 +107,7 @@ class Scene:
             self.active_handles = handle_ids
             self.active_handles_changed.emit()
 
-    def set_picked(self, row: int | None) -> None:
+    def set_picked(self, row: FileRow | None) -> None:
         """Choose the splat that is inspected, by file row, or none."""
         if row != self.picked:
             self.picked = row

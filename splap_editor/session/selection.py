@@ -3,12 +3,10 @@
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from splap_editor.core.graph.splat_graph import SplatGraph
+from splap_editor.core.index_spaces import FileMask, NodeMask
 from splap_editor.core.splats.occupancy import Ellipses
-
-Mask = NDArray[np.bool_]
 
 
 class SelectionMode(Enum):
@@ -20,7 +18,7 @@ class SelectionMode(Enum):
     INTERSECT = "intersect"
 
 
-def combined_selection(selection: Mask, picked: Mask, mode: SelectionMode) -> Mask:
+def combined_selection(selection: FileMask, picked: FileMask, mode: SelectionMode) -> FileMask:
     """Apply a picked mask to a selection; every selection tool ends here."""
     if mode is SelectionMode.ADD:
         return selection | picked
@@ -31,21 +29,21 @@ def combined_selection(selection: Mask, picked: Mask, mode: SelectionMode) -> Ma
     return picked.copy()
 
 
-def grown_selection(selection: Mask, ellipses: Ellipses, graph: SplatGraph) -> Mask:
+def grown_selection(selection: FileMask, ellipses: Ellipses, graph: SplatGraph) -> FileMask:
     """Add the graph neighbours of the selected splats."""
     nodes = selection[ellipses.rows]
     touched = (graph.matrix() @ nodes.astype(np.float64)) > 0
     return _with_nodes(selection, ellipses, nodes | touched)
 
 
-def shrunk_selection(selection: Mask, ellipses: Ellipses, graph: SplatGraph) -> Mask:
+def shrunk_selection(selection: FileMask, ellipses: Ellipses, graph: SplatGraph) -> FileMask:
     """Drop the selected splats that have a neighbour outside the selection."""
     nodes = selection[ellipses.rows]
     outside = (graph.matrix() @ (~nodes).astype(np.float64)) > 0
     return _with_nodes(selection, ellipses, nodes & ~outside)
 
 
-def connected_selection(selection: Mask, ellipses: Ellipses, graph: SplatGraph) -> Mask:
+def connected_selection(selection: FileMask, ellipses: Ellipses, graph: SplatGraph) -> FileMask:
     """Select every splat in a component of the graph that holds a selected one."""
     nodes = selection[ellipses.rows]
     reached = np.zeros(graph.components.max(initial=-1) + 1, bool)
@@ -53,7 +51,7 @@ def connected_selection(selection: Mask, ellipses: Ellipses, graph: SplatGraph) 
     return _with_nodes(selection, ellipses, reached[graph.components])
 
 
-def _with_nodes(selection: Mask, ellipses: Ellipses, nodes: Mask) -> Mask:
+def _with_nodes(selection: FileMask, ellipses: Ellipses, nodes: NodeMask) -> FileMask:
     mask = selection.copy()
     mask[ellipses.rows] = nodes
     return mask

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from splap_editor.core.handle_nodes import Region
+from splap_editor.core.index_spaces import FileMask
 from splap_editor.engine.cache import StageCache
 from splap_editor.engine.edit import HANDLE_COLORS, Edit, Handle, Pose, binds_like, poses_like
 from splap_editor.engine.keyframes import auto_keyed_edit
@@ -156,7 +156,7 @@ class Session:
         scene = self._scene()
         self.history.push(ChangeEdit(scene, scene.edit, auto_keyed_edit(scene.edit, edit), label))
 
-    def change_mask(self, name: str, mask: NDArray[np.bool_], label: str) -> None:
+    def change_mask(self, name: str, mask: FileMask, label: str) -> None:
         """Replace ``"selection"`` or ``"hidden"``, (N,) of file rows, as one undoable step; none if nothing changes."""
         scene = self._scene()
         if not np.array_equal(getattr(scene, name), mask):

@@ -4,6 +4,8 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.index_spaces import RowsByPlace
+
 _BINS = 1 << 16
 
 
@@ -36,7 +38,7 @@ def _bin(behind, scale):
     return np.int64(place) if 0.0 <= place <= _BINS - 1 else np.int64(_BINS - 1)
 
 
-def depth_order(means: NDArray[np.float32], direction: NDArray[np.floating]) -> NDArray[np.int32]:
+def depth_order(means: NDArray[np.float32], direction: NDArray[np.floating]) -> RowsByPlace:
     """Rows of splats from the farthest to the nearest along a viewing direction.
 
     A counting sort on depths quantised to 16 bits: centres nearer to each

@@ -7,6 +7,7 @@ from vtkmodules.util.numpy_support import numpy_to_vtk
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
 from vtkmodules.vtkRenderingCore import vtkPolyDataMapper, vtkRenderer
 
+from splap_editor.core.index_spaces import FileRows
 from splap_editor.resources import shader
 from splap_editor.viewport.gizmo_actor import unlit_actor
 from splap_editor.viewport.projection import Projection
@@ -168,7 +169,7 @@ class EdgeLines:
         fragment.SetUniform3f("fadeRange", (middle - half, middle + half, self.near))
 
 
-def edges_within_hops(edges: NDArray[np.integer], rows: ArrayLike, n_hops: int, n_splats: int) -> NDArray[np.bool_]:
+def edges_within_hops(edges: FileRows, rows: ArrayLike, n_hops: int, n_splats: int) -> NDArray[np.bool_]:
     """(E,) which edges (E, 2) are reached from the given rows in at most this many steps."""
     reached = np.zeros(n_splats, bool)
     reached[np.asarray(rows, np.intp)] = True

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.index_spaces import FileRows
 from splap_editor.viewport.projection import Projection
 
 END_PX, END_SHARE = 7.0, 0.3
@@ -14,7 +15,7 @@ _DEPTH_SLACK = 0.02
 def edge_under(
     projection: Projection,
     positions: NDArray[np.floating],
-    edges: NDArray[np.integer],
+    edges: FileRows,
     xy: tuple[float, float],
     reach_px: float,
     *,

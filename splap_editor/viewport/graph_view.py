@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.graph.ellipse_offset import normal_offsets
+from splap_editor.core.index_spaces import FileRows
 from splap_editor.engine.pipeline import Surface
 from splap_editor.session.jobs import Job
 from splap_editor.session.latest_job import LatestJob
@@ -62,7 +63,7 @@ class ColoredEdges:
 
     surface: Surface
     color: str
-    rows: NDArray[np.int64]
+    rows: FileRows
     colors: NDArray[np.uint8]
     low: float
     high: float
@@ -108,7 +109,7 @@ class GraphView:
         self.changed = Signal()
         self.options = GraphViewOptions()
         self.colored: ColoredEdges | None = None
-        self.rows: NDArray[np.int64] = np.empty((0, 2), np.int64)
+        self.rows: FileRows = np.empty((0, 2), np.int64)
         self._session = session
         self._view = view
         self._job = LatestJob(session.detail_worker, "edges")

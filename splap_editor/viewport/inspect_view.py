@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.index_spaces import FileRow, FileRows, Nodes, RowPair
 from splap_editor.session.neighbor_sets import NeighborComparison, compared, neighbor_set
 from splap_editor.session.scene import Scene
 from splap_editor.session.scene_follower import SceneFollower
@@ -55,8 +56,8 @@ class InspectView:
         self.changed = Signal()
         self.options = InspectOptions()
         self.comparison: NeighborComparison | None = None
-        self.edge: tuple[int, int] | None = None
-        self.more_edges: Callable[[], NDArray[np.integer]] = lambda: np.empty((0, 2), np.int64)
+        self.edge: RowPair | None = None
+        self.more_edges: Callable[[], FileRows] = lambda: np.empty((0, 2), np.int64)
         self._is_on = False
         self._session = session
         self._view = view
@@ -83,7 +84,7 @@ class InspectView:
         self.options = replace(self.options, **values)
         self._update()
 
-    def pick(self, row: int | None) -> None:
+    def pick(self, row: FileRow | None) -> None:
         """Inspect a splat, or none; an edge that was inspected is let go."""
         scene = self._session.scene
         self.edge = None
@@ -92,12 +93,12 @@ class InspectView:
         else:
             scene.set_picked(row)
 
-    def pick_edge(self, rows: tuple[int, int] | None) -> None:
+    def pick_edge(self, rows: RowPair | None) -> None:
         """Inspect a pair of splats, or none."""
         self.edge = rows
         self._update()
 
-    def neighbor_edges(self) -> NDArray[np.int64]:
+    def neighbor_edges(self) -> FileRows:
         """(E, 2) file rows of the picked splat and each of its neighbours that are shown."""
         scene, both = self._session.scene, self.comparison
         if both is None:
@@ -126,7 +127,7 @@ class InspectView:
         if surface is None or node < 0:
             return None
 
-        def near(kind: str) -> NDArray[np.int64]:
+        def near(kind: str) -> Nodes:
             return neighbor_set(kind, node, scene.ellipses, surface.graph, surface.neighborhoods, k=options.k)
 
         first = near(options.kind)
@@ -140,7 +141,7 @@ class InspectView:
             marks.append((np.array([scene.picked]), (255, 255, 255, 255)))
         self._view.mark(marks)
 
-    def _groups(self) -> list[tuple[NDArray[np.int64], tuple[int, int, int]]]:
+    def _groups(self) -> list[tuple[Nodes, tuple[int, int, int]]]:
         """Neighbours and their colours."""
         both = self.comparison
         if both is None:
@@ -170,7 +171,7 @@ class InspectView:
         self._view.viewport.request_render()
 
 
-def ellipse_loop(scene: Scene, row: int, n_points: int = 72) -> NDArray[np.float64]:
+def ellipse_loop(scene: Scene, row: FileRow, n_points: int = 72) -> NDArray[np.float64]:
     """(n_points, 3) rim of a splat's occupancy ellipse where it is on screen; its centre alone if it is inert."""
     node = int(scene.ellipses.node_of_row[row])
     center = np.asarray(scene.positions[row], np.float64)

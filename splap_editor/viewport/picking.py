@@ -6,6 +6,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.index_spaces import FileRow
 from splap_editor.viewport.projection import Projection
 from splap_editor.viewport.splat_actor import DisplayMode, SplatActor, SplatFlag
 
@@ -18,7 +19,7 @@ class Hit:
 
     Parameters
     ----------
-    row : int
+    row : FileRow
         Splat hit, row in the file.
     point : (3,) float64
         Where the ray meets the plane of the splat, world units.
@@ -26,7 +27,7 @@ class Hit:
         Unit normal of the splat, towards the eye.
     """
 
-    row: int
+    row: FileRow
     point: NDArray[np.float64]
     normal: NDArray[np.float64]
 

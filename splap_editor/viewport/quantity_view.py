@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.index_spaces import FileMask, FileRow
 from splap_editor.engine.quantities import QUANTITIES, Quantity, Snapshot, missing
 from splap_editor.session.bound_edit import snapshot_of
 from splap_editor.session.jobs import Job
@@ -84,7 +85,7 @@ class ShownQuantity:
             return label_colors(values)
         return mapped_colors(shares(values, self.low, self.high, is_log=self.is_log), self.options.colormap)
 
-    def within(self, low: float, high: float) -> NDArray[np.bool_]:
+    def within(self, low: float, high: float) -> FileMask:
         """(N,) which splats have a value from ``low`` to ``high``, both included."""
         return (self.values >= low) & (self.values <= high)
 
@@ -177,7 +178,7 @@ class QuantityView:
             self.options = options
             self._ask()
 
-    def value_text(self, row: int | None) -> str:
+    def value_text(self, row: FileRow | None) -> str:
         """The quantity of a splat in words; empty when none is shown."""
         if self.shown is None or row is None:
             return ""

@@ -4,6 +4,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from splap_editor.core.index_spaces import FileMask
 from splap_editor.viewport.projection import Projection
 from splap_editor.viewport.splat_actor import DisplayMode, SplatActor, SplatFlag
 
@@ -59,7 +60,7 @@ def _in_box(screen, x0, y0, x1, y1, inside):
         inside[i] = x0 <= screen[i, 0] <= x1 and y0 <= screen[i, 1] <= y1
 
 
-def in_rectangle(screen: NDArray[np.float32], x0: float, y0: float, x1: float, y1: float) -> NDArray[np.bool_]:
+def in_rectangle(screen: NDArray[np.float32], x0: float, y0: float, x1: float, y1: float) -> FileMask:
     """(N,) whether each of the `screen_points` lies in a rectangle given by two opposite corners."""
     inside = np.empty(len(screen), bool)
     xs, ys = sorted((float(x0), float(x1))), sorted((float(y0), float(y1)))
@@ -97,7 +98,7 @@ def _in_mask(screen, mask, left, top, inside):
         inside[i] = 0.0 <= x < width and 0.0 <= y < height and mask[int(y), int(x)] == 1
 
 
-def in_lasso(screen: NDArray[np.float32], polygon: ArrayLike) -> NDArray[np.bool_]:
+def in_lasso(screen: NDArray[np.float32], polygon: ArrayLike) -> FileMask:
     """(N,) whether each of the `screen_points` lies in a closed polygon (K, 2) of pixels, even-odd, to one pixel."""
     polygon = np.ascontiguousarray(polygon, np.float64)
     if polygon.ndim != 2 or polygon.shape[1] != 2:
@@ -132,7 +133,7 @@ def _near_path(screen, path, radius, inside):
                 break
 
 
-def in_brush(screen: NDArray[np.float32], path: ArrayLike, radius_px: float) -> NDArray[np.bool_]:
+def in_brush(screen: NDArray[np.float32], path: ArrayLike, radius_px: float) -> FileMask:
     """(N,) whether each of the `screen_points` lies within a radius of a stroke (K, 2) of pixels, K >= 1."""
     path = np.ascontiguousarray(np.atleast_2d(path), np.float64)
     if path.ndim != 2 or path.shape[1] != 2 or not len(path):
@@ -216,10 +217,10 @@ def visible_only(
     actor: SplatActor,
     projection: Projection,
     screen: NDArray[np.float32],
-    inside: NDArray[np.bool_],
+    inside: FileMask,
     *,
     slack: float = 0.015,
-) -> NDArray[np.bool_]:
+) -> FileMask:
     """Those splats of a region that nothing else hides.
 
     The ellipses are drawn into a coarse depth grid over the region, so the

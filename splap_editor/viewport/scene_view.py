@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
+from splap_editor.core.index_spaces import FileRows, RowsByPlace
 from splap_editor.core.splats.rotations import quats_to_matrices
 from splap_editor.core.splats.spherical_harmonics import view_colors
 from splap_editor.core.splats.splats import Splats
@@ -52,7 +53,7 @@ class SeenFrom:
 class Presented:
     """What the worker made for one view of the splats: drawing order and colours, None where neither is wanted."""
 
-    order: NDArray[np.int32] | None
+    order: RowsByPlace | None
     colors: NDArray[np.uint8] | None
 
 
@@ -123,7 +124,7 @@ class SceneView:
         self._shows_tints = True
         self._tinted_for: tuple[object, ...] = ()
         self._paints: dict[str, NDArray[np.uint8]] = {}
-        self._marks: tuple[tuple[NDArray[np.integer], tuple[int, int, int, int]], ...] = ()
+        self._marks: tuple[tuple[FileRows, tuple[int, int, int, int]], ...] = ()
         self._view_job = LatestJob(session.view_worker, "view")
         self._seen = SeenFrom(np.zeros(3), np.array([0.0, 0.0, -1.0], np.float32), False)
         viewport.splats.view_turned = self._on_view_turned
@@ -172,7 +173,7 @@ class SceneView:
         self._tinted_for = ("stale",)
         self._show_tints()
 
-    def mark(self, marks: Iterable[tuple[NDArray[np.integer], tuple[int, int, int, int]]]) -> None:
+    def mark(self, marks: Iterable[tuple[FileRows, tuple[int, int, int, int]]]) -> None:
         """Lay a colour and its share, 0..255, over some file rows, above tints and paint; none: no marks."""
         marks = tuple(marks)
         if marks or self._marks:
@@ -180,7 +181,7 @@ class SceneView:
             self._tinted_for = ("stale",)
             self._show_tints()
 
-    def rows_of_handles(self, handle_ids: Iterable[int]) -> NDArray[np.int64]:
+    def rows_of_handles(self, handle_ids: Iterable[int]) -> FileRows:
         """File rows that these handles hold, empty while nothing is bound."""
         bound = self._session.bound
         if bound is None or self._scene is None:

@@ -11,6 +11,7 @@ from vtkmodules.vtkCommonCore import VTK_INT, vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkDataObject, vtkPolyData
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
+from splap_editor.core.index_spaces import RowsByPlace
 from splap_editor.resources import shader
 from splap_editor.viewport.glyphs import Glyphs
 
@@ -121,7 +122,7 @@ class SplatActor:
         self.flags = np.zeros(n, np.uint8)
         self._untinted = np.array(colors, np.uint8)
         self._tints: NDArray[np.uint8] | None = None
-        self._order: NDArray[np.int32] | None = None
+        self._order: RowsByPlace | None = None
         self._shuffled = np.random.default_rng(0).permutation(n).astype(np.int32)
         self._thinning = 1
         self._build()
@@ -199,7 +200,7 @@ class SplatActor:
         self.flags[:] = flags
         self._modified("flags")
 
-    def set_order(self, order: NDArray[np.int32] | None) -> None:
+    def set_order(self, order: RowsByPlace | None) -> None:
         """Draw in this order, a permutation (N,) of the rows, farthest first; None: file order."""
         self._order = order
         self._index()

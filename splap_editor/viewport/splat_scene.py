@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from vtkmodules.vtkRenderingCore import vtkRenderer
 
+from splap_editor.core.index_spaces import FileRows, RowsByPlace
 from splap_editor.viewport.depth_order import depth_order
 from splap_editor.viewport.edge_lines import EdgeLines
 from splap_editor.viewport.glyphs import Glyphs
@@ -61,7 +62,7 @@ class SplatScene:
         self._original: SplatActor | None = None
         self._rest: Glyphs | None = None
         self._flags = np.zeros(0, np.uint8)
-        self._highlighted: NDArray[np.integer] | None = None
+        self._highlighted: FileRows | None = None
         self._looks = dict(DEFAULT_LOOKS)
         self._mode = DisplayMode.SPLATS
         self._compare = Compare.DEFORMED
@@ -100,7 +101,7 @@ class SplatScene:
         axes_v: NDArray[np.floating],
         *,
         thickness: NDArray[np.floating] | None = None,
-        order: NDArray[np.int32] | None = None,
+        order: RowsByPlace | None = None,
     ) -> None:
         """Show deformed splats: centres and 1-sigma axes (N, 3); ``order``: their `depth_order`, if known."""
         self.deformed.set_geometry(means, axes_u, axes_v, thickness)
@@ -142,7 +143,7 @@ class SplatScene:
             self._original.set_flags(self._flags)
         self.request_render()
 
-    def set_order(self, order: NDArray[np.int32]) -> None:
+    def set_order(self, order: RowsByPlace) -> None:
         """Take a `depth_order` that the worker made for the deformed splats."""
         self.deformed.set_order(order)
         self._needs_order = False

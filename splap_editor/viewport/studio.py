@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 from vtkmodules.vtkRenderingCore import vtkRenderWindow
 
 from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
+from splap_editor.core.index_spaces import FileMask
 from splap_editor.core.splats.spherical_harmonics import view_colors
 from splap_editor.core.splats.splats import Splats
 from splap_editor.viewport.camera import View, orbited
@@ -31,7 +32,7 @@ class Studio:
     """
 
     def __init__(
-        self, splats: Splats, look: SplatLook, width: int, height: int, *, hidden: NDArray[np.bool_] | None = None
+        self, splats: Splats, look: SplatLook, width: int, height: int, *, hidden: FileMask | None = None
     ) -> None:
         self._splats = splats
         self._size = width, height

@@ -9,6 +9,7 @@ import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - registers the OpenGL imple
 from numpy.typing import ArrayLike, NDArray
 from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow
 
+from splap_editor.core.index_spaces import FileMask
 from splap_editor.viewport.axes_triad import AxesTriad
 from splap_editor.viewport.cage_outline import CageOutline
 from splap_editor.viewport.camera import Camera, View, box_corners
@@ -183,21 +184,19 @@ class Viewport:
         actor = self.splats.shown
         return np.empty((0, 3), np.float32) if actor is None else screen_points(actor, self.projection)
 
-    def in_rectangle(
-        self, screen: NDArray[np.float32], x0: float, y0: float, x1: float, y1: float
-    ) -> NDArray[np.bool_]:
+    def in_rectangle(self, screen: NDArray[np.float32], x0: float, y0: float, x1: float, y1: float) -> FileMask:
         """(N,) which `screen_points` lie between two corners."""
         return in_rectangle(screen, x0, y0, x1, y1)
 
-    def in_lasso(self, screen: NDArray[np.float32], polygon: ArrayLike) -> NDArray[np.bool_]:
+    def in_lasso(self, screen: NDArray[np.float32], polygon: ArrayLike) -> FileMask:
         """(N,) which `screen_points` lie in a closed polygon (K, 2)."""
         return in_lasso(screen, polygon)
 
-    def in_brush(self, screen: NDArray[np.float32], path: ArrayLike, radius_px: float) -> NDArray[np.bool_]:
+    def in_brush(self, screen: NDArray[np.float32], path: ArrayLike, radius_px: float) -> FileMask:
         """(N,) which `screen_points` lie within a radius of a stroke (K, 2)."""
         return in_brush(screen, path, radius_px)
 
-    def visible_only(self, screen: NDArray[np.float32], inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def visible_only(self, screen: NDArray[np.float32], inside: FileMask) -> FileMask:
         """Those of a region (N,) bool that no other splat hides."""
         actor = self.splats.shown
         return inside if actor is None else visible_only(actor, self.projection, screen, inside)
