@@ -16,7 +16,31 @@ os.environ.setdefault("QT_API", "pyside6")
 import numpy as np
 import pytest
 
+from tests.kinds import KINDS, kind_of, rank
+
 _THREAD_GRACE_S = 5.0
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Declare the marks of the kinds of test."""
+    for kind, need in KINDS.items():
+        config.addinivalue_line("markers", f"{kind}: {need}")
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Leave files alone that need more than the kind asked for: importing them may fail where that is missing."""
+    kind, wanted = kind_of(collection_path), config.option.markexpr
+    return True if wanted in KINDS and kind is not None and rank(kind) > rank(wanted) else None
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark every test by its kind, before ``-m`` chooses among them."""
+    for item in items:
+        kind = kind_of(item.path)
+        if kind is None:
+            raise pytest.UsageError(f"{item.path} has no kind: give it, or its folder, one in tests/kinds.py")
+        item.add_marker(kind)
 
 
 @pytest.fixture(autouse=True)

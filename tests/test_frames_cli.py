@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from PySide6.QtGui import QImage
+from PIL import Image
 
 from splap_editor.cli import main
 from splap_editor.io.ply import read_ply
@@ -53,8 +53,8 @@ def session(tmp_path, ply):
 
 def picture(path):
     """(H, W, 4) pixels of a PNG."""
-    image = QImage(str(path)).convertToFormat(QImage.Format.Format_RGBA8888)
-    return np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), image.width(), 4).copy()
+    with Image.open(path) as image:
+        return np.array(image.convert("RGBA"))
 
 
 def test_frames_of_a_session_become_files(tmp_path, ply, session, capsys):

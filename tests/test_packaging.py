@@ -56,7 +56,7 @@ def test_every_third_party_import_is_a_declared_dependency():
         return re.split(r"[<>=\[; ]", name)[0].lower().replace("-", "_")
 
     declared = {normal(name) for name in PROJECT["project"]["dependencies"]}
-    modules = {"igl": "libigl", "PySide6": "pyside6_essentials", "vtkmodules": "vtk"}
+    modules = {"igl": "libigl", "PIL": "pillow", "PySide6": "pyside6_essentials", "vtkmodules": "vtk"}
     missing = set()
     for path in _modules():
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
