@@ -5,15 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
-from splap_editor.core.graph.ellipse_offset import touch_scales
 from splap_editor.core.graph.splat_graph import GraphOptions, SplatGraph
-from splap_editor.core.index_spaces import FileMask, FileRows, Nodes, RowPair
+from splap_editor.core.index_spaces import FileMask, FileRows, RowPair
 from splap_editor.core.splats.occupancy import Ellipses
-
-N_CANDIDATES = 12
-"""Nearest centres on the other side among which a splat looks for its best contact."""
+from splap_editor.core.surface.joining import best_contacts, contact_order, near_pairs
 
 FRAGMENT_SHARE = 0.01
 """A component of at most such a share of all nodes is a fragment, if it is not the largest."""
@@ -50,9 +46,7 @@ def edges_between(ellipses: Ellipses, graph: SplatGraph, first: FileMask, second
 def best_links(ellipses: Ellipses, epsilon: float, first: FileMask, second: FileMask) -> list[RowPair]:
     """Contacts by which two selections are best joined.
 
-    Each splat of one side ranks its nearest centres on the other by touch
-    scale, then by distance; those that choose each other are joined, at least
-    the best pair of all.
+    See `best_contacts`.
 
     Parameters
     ----------
@@ -69,16 +63,7 @@ def best_links(ellipses: Ellipses, epsilon: float, first: FileMask, second: File
     """
     a = np.flatnonzero(first[ellipses.rows])
     b = np.flatnonzero((second & ~first)[ellipses.rows])
-    if not len(a) or not len(b):
-        return []
-    pairs = np.concatenate([_near_pairs(ellipses, a, b), _near_pairs(ellipses, b, a)[:, ::-1]])
-    pairs = np.unique(pairs, axis=0)
-    order = _by_contact(ellipses, pairs, epsilon)
-    pairs = pairs[order]
-    # The best of each end comes first in the order.
-    best = [np.unique(pairs[:, side], return_index=True)[1] for side in (0, 1)]
-    chosen = np.union1d(np.intersect1d(*best), [0])
-    return _as_pairs(ellipses.rows[pairs[chosen]])
+    return _as_pairs(ellipses.rows[best_contacts(ellipses, a, b, epsilon * ellipses.scene_scale)])
 
 
 def fragments(graph: SplatGraph) -> NDArray[np.int64]:
@@ -110,10 +95,10 @@ def fragment_links(ellipses: Ellipses, graph: SplatGraph, epsilon: float) -> tup
     a, b = np.flatnonzero(is_small), np.flatnonzero(~is_small)
     if not len(a) or not len(b):
         return [], len(small)
-    pairs = _near_pairs(ellipses, a, b)
+    pairs = near_pairs(ellipses, a, b)
     apart = np.linalg.norm(ellipses.centers[pairs[:, 0]] - ellipses.centers[pairs[:, 1]], axis=1)
     pairs = pairs[apart <= JOIN_REACH * ellipses.reaches[pairs].sum(axis=1)]
-    pairs = pairs[_by_contact(ellipses, pairs, epsilon)]
+    pairs = pairs[contact_order(ellipses, pairs, epsilon * ellipses.scene_scale)]
     owners = graph.components[pairs[:, 0]]
     # Rank within the fragment: pairs are in order of contact, and a stable sort keeps that for each owner.
     order = np.argsort(owners, kind="stable")
@@ -121,20 +106,6 @@ def fragment_links(ellipses: Ellipses, graph: SplatGraph, epsilon: float) -> tup
     ranks = np.arange(len(order)) - np.repeat(starts, np.diff(np.append(starts, len(order))))
     chosen = order[ranks < N_LINKS]
     return _as_pairs(ellipses.rows[pairs[chosen]]), len(small) - len(starts)
-
-
-def _near_pairs(ellipses: Ellipses, a: Nodes, b: Nodes) -> Nodes:
-    """(P, 2) each node of a with its nearest ones of b."""
-    k = min(N_CANDIDATES, len(b))
-    near = cKDTree(ellipses.centers[b]).query(ellipses.centers[a], k=k)[1].reshape(len(a), k)
-    return np.stack([np.repeat(a, k), b[near.ravel()]], axis=1)
-
-
-def _by_contact(ellipses: Ellipses, pairs: Nodes, epsilon: float) -> NDArray[np.int64]:
-    """Order of pairs by touch scale, those that never touch by distance after all others."""
-    scales = touch_scales(ellipses, pairs, epsilon * ellipses.scene_scale)
-    apart = np.linalg.norm(ellipses.centers[pairs[:, 0]] - ellipses.centers[pairs[:, 1]], axis=1)
-    return np.lexsort((pairs[:, 1], pairs[:, 0], apart, scales))
 
 
 def _as_pairs(rows: FileRows) -> list[RowPair]:
