@@ -13,6 +13,7 @@ from splap_editor.core.splats.spherical_harmonics import view_colors
 from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.edit import Handle
 from splap_editor.session.depictor import HandOver
+from splap_editor.session.jobs import Job
 from splap_editor.session.latest_job import LatestJob
 from splap_editor.session.scene import Scene
 from splap_editor.session.scene_follower import SceneFollower
@@ -87,7 +88,7 @@ def depiction(splats: Splats) -> Depiction:
 
 def presented(depicted: Depiction, kernels: AdaptedKernels | None, seen: SeenFrom) -> Presented:
     """Sort and colour splats for a view; for the worker."""
-    means = np.ascontiguousarray(depicted.rest.means, np.float32) if kernels is None else kernels.means_f32
+    means = _rest_means(depicted) if kernels is None else kernels.means_f32
     order = depth_order(means, seen.direction) if seen.is_blended else None
     if not len(depicted.shN):
         return Presented(order, None)
@@ -344,16 +345,30 @@ class SceneView:
         scene = self._scene
         if scene is None:
             return
-        kernels, seen, depicted = scene.kernels, self._seen, self._depicted
+        kernels, seen, depicted, splats = scene.kernels, self._seen, self._depicted, self.viewport.splats
+        sorts_original = seen.is_blended and splats.has_original
 
-        def done(made: Presented) -> None:
-            if self._scene is scene and scene.kernels is kernels and self._is_shown:
+        def present(job: Job) -> tuple[Presented, RowsByPlace | None]:
+            made = presented(depicted, kernels, seen)
+            return made, depth_order(_rest_means(depicted), seen.direction) if sorts_original else None
+
+        def done(both: tuple[Presented, RowsByPlace | None]) -> None:
+            if self._scene is not scene or not self._is_shown:
+                return
+            made, original_order = both
+            if original_order is not None:
+                splats.set_original_order(original_order)
+            if scene.kernels is kernels:
                 if made.order is not None:
-                    self.viewport.splats.set_order(made.order)
+                    splats.set_order(made.order)
                 if made.colors is not None:
-                    self.viewport.splats.set_colors(made.colors)
+                    splats.set_colors(made.colors)
 
-        self._view_job.ask(lambda job: presented(depicted, kernels, seen), done)
+        self._view_job.ask(present, done)
+
+
+def _rest_means(depicted: Depiction) -> NDArray[np.float32]:
+    return np.ascontiguousarray(depicted.rest.means, np.float32)
 
 
 def _center(handle: Handle) -> NDArray[np.float64]:

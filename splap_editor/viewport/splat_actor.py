@@ -200,6 +200,11 @@ class SplatActor:
         self.flags[:] = flags
         self._modified("flags")
 
+    @property
+    def is_unordered(self) -> bool:
+        """Whether it is drawn in file order."""
+        return self._order is None
+
     def set_order(self, order: RowsByPlace | None) -> None:
         """Draw in this order, a permutation (N,) of the rows, farthest first; None: file order."""
         self._order = order

@@ -149,6 +149,17 @@ class SplatScene:
         self._needs_order = False
         self.request_render()
 
+    @property
+    def has_original(self) -> bool:
+        """Whether there is the original to compare with, so that it wants an order too."""
+        return self._original is not None
+
+    def set_original_order(self, order: RowsByPlace) -> None:
+        """Take a `depth_order` that the worker made for the original."""
+        if self._original:
+            self._original.set_order(order)
+            self.request_render()
+
     # Display ------------------------------------------------------------------------------------------------------
 
     @property
@@ -248,8 +259,9 @@ class SplatScene:
                 self.view_turned(projection)
         if self._mode is not DisplayMode.SPLATS:
             return
-        if self._needs_order or (has_turned and not self.view_turned):
+        needs_order = self._needs_order or (has_turned and not self.view_turned)
+        if needs_order:
             self.deformed.set_order(depth_order(self.deformed.means, direction))
             self._needs_order = False
-        if self._original and has_turned:
+        if self._original and (needs_order or self._original.is_unordered):
             self._original.set_order(depth_order(self._original.means, direction))
