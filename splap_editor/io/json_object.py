@@ -4,7 +4,7 @@ import json
 import math
 from collections.abc import Callable, Iterator
 from difflib import get_close_matches
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar, overload
 
 from splap_editor.core.options import Option, options_of
 
@@ -97,13 +97,23 @@ class JsonObject:
             raise self.refuse(key, f"a finite number{bound}")
         return number
 
+    @overload
+    def vector(
+        self, key: str, size: Literal[3], default: tuple[float, ...] | None = None
+    ) -> tuple[float, float, float]: ...
+    @overload
+    def vector(
+        self, key: str, size: Literal[4], default: tuple[float, ...] | None = None
+    ) -> tuple[float, float, float, float]: ...
+
     def vector(self, key: str, size: int, default: tuple[float, ...] | None = None) -> tuple[float, ...]:
         """A list of finite numbers; without a default it must be there."""
         value = self._value.get(key, default)
-        numbers = [_finite(item) for item in value] if isinstance(value, list | tuple) else []
-        if len(numbers) != size or None in numbers:
+        items = value if isinstance(value, list | tuple) else []
+        numbers = tuple(number for item in items if (number := _finite(item)) is not None)
+        if not len(numbers) == len(items) == size:
             raise self.refuse(key, f"a list of {size} finite numbers")
-        return tuple(numbers)
+        return numbers
 
     def options(self, group: type[Group]) -> Group:
         """An option group, each option under its name; a missing one takes its default."""
