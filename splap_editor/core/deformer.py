@@ -43,6 +43,12 @@ class Handles:
         """Number of handles H."""
         return len(self.centers)
 
+    def resting(self, n_nodes: int) -> NDArray[np.bool_]:
+        """(n,) nodes that are held at rest: the pins, and what lies outside the free region."""
+        is_resting = np.zeros(n_nodes, np.bool_)
+        is_resting[self.indices[self.labels < 0]] = True
+        return is_resting
+
     def targets(self, rest: NDArray[np.float64], transforms: NDArray[np.float64]) -> NDArray[np.float64]:
         """Place the constrained nodes.
 
@@ -78,12 +84,16 @@ class Deformation:
         the scene scale; 0 when the result is exact.
     n_iterations : int
         Solver iterations spent.
+    resting : (n,) bool, optional
+        Nodes that are held at rest: whatever moves beside them, their splats are the file's own. None where all may
+        move.
     """
 
     positions: NDArray[np.float64]
     rotations: NDArray[np.float64]
     residual: float = 0.0
     n_iterations: int = 0
+    resting: NDArray[np.bool_] | None = None
 
 
 Shown = Callable[[Deformation], None]

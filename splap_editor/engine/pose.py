@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.splats.rotations import matrices_to_quats, quats_to_matrices
+from splap_editor.io.recipe_specs import LARGEST_COORDINATE, SCALES
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class Pose:
         return transform
 
     def moved(self, delta: NDArray[np.float64], center: NDArray[np.float64]) -> "Pose":
-        """Follow the pose by a world similarity.
+        """Follow the pose by a world similarity, as far as the limits of a pose allow.
 
         Parameters
         ----------
@@ -55,5 +56,7 @@ class Pose:
         scale = float(np.cbrt(np.linalg.det(delta[:3, :3])))
         turn = delta[:3, :3] / scale @ quats_to_matrices(np.array([self.rotate]))[0]
         at = delta[:3, :3] @ (center + np.array(self.translate)) + delta[:3, 3] - center
+        at = np.clip(at, -LARGEST_COORDINATE, LARGEST_COORDINATE)
         quat = matrices_to_quats(turn[None])[0]
-        return Pose(tuple(at.tolist()), tuple(quat.tolist()), (np.asarray(self.scale) * scale).tolist())
+        scales = np.clip(np.asarray(self.scale) * scale, *SCALES)
+        return Pose(tuple(at.tolist()), tuple(quat.tolist()), scales.tolist())

@@ -4,7 +4,7 @@ import json
 import math
 from collections.abc import Callable, Iterator
 from difflib import get_close_matches
-from typing import Any, Literal, TypeVar, overload
+from typing import Any, TypeVar
 
 from splap_editor.core.options import Option, options_of
 
@@ -89,31 +89,35 @@ class JsonObject:
             raise self.refuse(key, f"a whole number, {low} " + (f"to {high}" if high < 2**31 - 1 else "or more"))
         return int(value)
 
-    def number(self, key: str, default: float | None = None, *, above: float = -math.inf, least: bool = False) -> float:
-        """A finite number above a bound, or at least it; without a default it must be there."""
+    def number(
+        self,
+        key: str,
+        default: float | None = None,
+        *,
+        above: float = -math.inf,
+        least: bool = False,
+        most: float = math.inf,
+    ) -> float:
+        """A finite number above a bound, or at least it, and not beyond another; without a default it must be there."""
         number = _finite(self._value.get(key, default))
-        if number is None or number < above or (number == above and not least):
+        if number is None or number < above or (number == above and not least) or number > most:
             bound = "" if above == -math.inf else f" of at least {above:g}" if least else f" greater than {above:g}"
+            bound += "" if most == math.inf else f" and at most {most:g}" if bound else f" of at most {most:g}"
             raise self.refuse(key, f"a finite number{bound}")
         return number
 
-    @overload
     def vector(
-        self, key: str, size: Literal[3], default: tuple[float, ...] | None = None
-    ) -> tuple[float, float, float]: ...
-    @overload
-    def vector(
-        self, key: str, size: Literal[4], default: tuple[float, ...] | None = None
-    ) -> tuple[float, float, float, float]: ...
-
-    def vector(self, key: str, size: int, default: tuple[float, ...] | None = None) -> tuple[float, ...]:
-        """A list of finite numbers; without a default it must be there."""
+        self, key: str, size: int, default: tuple[float, ...] | None = None, *, most: float = math.inf
+    ) -> tuple[float, ...]:
+        """A list of finite numbers of at most that size; without a default it must be there."""
         value = self._value.get(key, default)
-        items = value if isinstance(value, list | tuple) else []
-        numbers = tuple(number for item in items if (number := _finite(item)) is not None)
-        if not len(numbers) == len(items) == size:
-            raise self.refuse(key, f"a list of {size} finite numbers")
-        return numbers
+        # A list of any other length is not looked at further.
+        fits = isinstance(value, list | tuple) and len(value) == size
+        numbers = [_finite(item) for item in value] if fits else [None]
+        if None in numbers or max(map(abs, numbers)) > most:
+            bound = "" if most == math.inf else f" between {-most:g} and {most:g}"
+            raise self.refuse(key, f"a list of {size} finite numbers{bound}")
+        return tuple(numbers)
 
     def options(self, group: type[Group]) -> Group:
         """An option group, each option under its name; a missing one takes its default."""

@@ -13,6 +13,8 @@ from splap_editor.io.atomic_file import atomic_file
 from splap_editor.io.json_object import JsonObject, json_lines, parsed_json, shown
 from splap_editor.io.recipe_specs import (
     DEFAULT_RADIUS,
+    LARGEST_COORDINATE,
+    SCALES,
     HandleSpec,
     PinSpec,
     PoseSpec,
@@ -145,10 +147,11 @@ def _solver(solver: JsonObject) -> SolverSpec:
 def _region(region: JsonObject) -> tuple[Vector | None, float | None, tuple[int, ...] | None]:
     """Center, radius and rows of a handle or pin."""
     if "rows" not in region:
-        return region.vector("center", 3), region.number("radius", above=0), None
+        return region.vector("center", 3, most=LARGEST_COORDINATE), region.number("radius", above=0), None
     if "radius" in region:
         raise region.refuse("radius", "left out where rows are given")
-    return region.vector("center", 3) if "center" in region else None, None, region.rows("rows")
+    center = region.vector("center", 3, most=LARGEST_COORDINATE) if "center" in region else None
+    return center, None, region.rows("rows")
 
 
 def _handle(handle: JsonObject, index: int) -> HandleSpec:
@@ -179,7 +182,7 @@ def pose_from_json(pose: JsonObject) -> PoseSpec:
         # Twice, since the length of very short ones is imprecise.
         rotate = tuple(part / length for part in rotate)
         rotate = tuple(part / math.hypot(*rotate) for part in rotate)
-    return PoseSpec(pose.vector("translate", 3, HandleSpec.translate), rotate, _scale(pose))
+    return PoseSpec(pose.vector("translate", 3, HandleSpec.translate, most=LARGEST_COORDINATE), rotate, _scale(pose))
 
 
 def pose_to_json(pose: PoseSpec) -> dict[str, Any]:
@@ -190,14 +193,15 @@ def pose_to_json(pose: PoseSpec) -> dict[str, Any]:
 def _scale(handle: JsonObject) -> float | Vector:
     """One factor, or one for each world axis."""
     try:
-        return handle.number("scale", HandleSpec.scale, above=0)
+        scale = handle.number("scale", HandleSpec.scale)
     except ValueError:
         try:
             scale = handle.vector("scale", 3)
         except ValueError:
             scale = (0.0,)
-    if min(scale) <= 0:
-        raise handle.refuse("scale", "a number greater than 0, or three of them")
+    least, largest = np.min(scale), np.max(scale)
+    if not SCALES[0] <= least <= largest <= SCALES[1]:
+        raise handle.refuse("scale", f"a number from {SCALES[0]:g} to {SCALES[1]:g}, or three of them")
     return scale
 
 

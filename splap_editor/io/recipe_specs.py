@@ -12,6 +12,12 @@ from splap_editor.core.graph.options import GraphOptions
 DEFAULT_RADIUS = math.nan
 """Stands for a radius that the recipe leaves to the program; always this very object, so that recipes compare."""
 
+LARGEST_COORDINATE = 1e30
+"""Largest coordinate, and largest move of a handle, in world units."""
+
+SCALES = (1e-6, 1e6)
+"""Least and largest scale of a handle. A coordinate times a scale stays well within single precision, 3.4e38."""
+
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from splap_editor.io.recipe_specs import LARGEST_COORDINATE, SCALES
 from splap_editor.viewport.camera import turn
 from splap_editor.viewport.gizmo_parts import (
     ARROW_END,
@@ -214,7 +215,13 @@ class Gizmo:
         return self.delta
 
     def type(self, value: float | None) -> NDArray[np.float64]:
-        """Take a typed number (world units, degrees, a factor) instead of the pointer; None: the pointer again."""
+        """Take a typed number (world units, degrees, a factor) instead of the pointer; None: the pointer again.
+
+        A number that no pose could follow becomes the nearest that one can.
+        """
+        if value is not None:
+            is_factor = self._drag.part.act is Act.SCALE
+            value = float(np.clip(value, *(SCALES if is_factor else (-LARGEST_COORDINATE, LARGEST_COORDINATE))))
         self.typed = value
         return self.move(*self._pointer, fine=self._is_fine)
 

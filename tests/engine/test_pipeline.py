@@ -17,7 +17,7 @@ from splap_editor.engine.pipeline import deformer_of, handles_of, kernels_of, su
 from splap_editor.engine.recipe_edit import edit_of, recipe_of
 from splap_editor.engine.surface_stages import packed_stages
 from splap_editor.io.ply import read_ply
-from splap_editor.io.recipe import recipe_from_json, recipe_to_json
+from splap_editor.io.recipe import SolverSpec, recipe_from_json, recipe_to_json
 from splap_editor.resources import resource
 
 
@@ -230,6 +230,26 @@ def test_a_recipe_and_its_edit_are_the_same(splats, surface):
     again = edit_of(recipe_from_json(recipe_to_json(recipe_of(edit))), splats)
     assert recipe_of(again) == recipe_of(edit)
     np.testing.assert_array_equal(posed(surface, splats, again).means, posed(surface, splats, edit).means)
+
+
+@pytest.mark.parametrize("kind", ["converged", "local-global", "bbw"])
+@pytest.mark.parametrize("adaptation", ["surface", "affine", "none"])
+def test_what_is_pinned_stays_the_files_own_and_nothing_outruns_its_handle(splats, surface, kind, adaptation):
+    center = surface.ellipses.centers[0]
+    near = np.linalg.norm(np.asarray(splats.means, np.float64) - center, axis=1) <= 0.1 * surface.ellipses.scene_scale
+    shift = 0.3 * surface.ellipses.scene_scale
+    handle = Handle(1, "one", "#ffffff", Region(center, 0.0, np.flatnonzero(near)), Pose((0.0, 0.0, shift)))
+    edit = Edit(
+        handles=(handle,),
+        pins=(Region(center, 0.0, np.flatnonzero(~near)),),
+        method="bbw" if kind == "bbw" else "arap",
+        solver=SolverSpec() if kind == "bbw" else SolverSpec(kind=kind),
+        adaptation=adaptation,
+    )
+    kernels = posed(surface, splats, edit)
+    assert near.sum() > 10 and kernels.changed[near].all() and not kernels.changed[~near].any()
+    moved = np.linalg.norm(kernels.means - np.asarray(splats.means, np.float64), axis=1)
+    assert moved.max() <= shift * (1.0 + 1e-9)
 
 
 @pytest.mark.parametrize("method", ["arap", "bbw"])

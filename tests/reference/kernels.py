@@ -38,7 +38,7 @@ def neighbourhood_map(ellipses, neighborhoods, deformation, i, size=6, damping=0
 
 def adapted_ellipse(ellipses, neighborhoods, deformation, i):
     """Centre, covariance at one standard deviation, and rotation of node i's ellipse after a deformation."""
-    moved = []
+    moved, carried_by = [], [i]
     for corner, carriers, weights in corner_carriers(ellipses, neighborhoods, i):
         images = [
             deformation.positions[j]
@@ -46,11 +46,17 @@ def adapted_ellipse(ellipses, neighborhoods, deformation, i):
             for j in carriers
         ]
         moved.append(np.asarray(weights) @ np.asarray(images))
+        carried_by += list(carriers)
     moved = np.asarray(moved)
     center = moved.mean(axis=0)
     # The Steiner circumellipse has the covariance of the three corners times two.
     half_diameters = np.stack([moved[0] - center, (moved[1] - moved[2]) / np.sqrt(3.0)])
     covariance = half_diameters.T @ half_diameters / ellipses.cutoffs[i] ** 2
+    # It goes no farther than the farthest of its own node and those that carry it.
+    shift = center - ellipses.centers[i]
+    farthest = np.linalg.norm(deformation.positions[carried_by] - ellipses.centers[carried_by], axis=1).max()
+    if np.linalg.norm(shift) > farthest:
+        center = ellipses.centers[i] + shift * farthest / np.linalg.norm(shift)
     lengths = np.linalg.norm(ellipses.semi_axes[i], axis=1)
     rest_frame = np.concatenate([ellipses.semi_axes[i] / lengths[:, None], ellipses.normals[i : i + 1]])
     left, _, right = np.linalg.svd((half_diameters / lengths[:, None]).T, full_matrices=False)

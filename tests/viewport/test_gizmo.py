@@ -1,6 +1,8 @@
 import numpy as np
 import pytest
 
+from splap_editor.engine.pose import Pose
+from splap_editor.io.recipe_specs import SCALES
 from splap_editor.viewport.camera import turn
 from splap_editor.viewport.gizmo import Gizmo
 from splap_editor.viewport.gizmo_parts import (
@@ -202,6 +204,15 @@ def test_typed_numbers_win_over_the_pointer_until_taken_back(gizmo, projection):
     np.testing.assert_allclose(gizmo.type(90.0)[:3, :3], turn(gizmo.axes[:, 2], np.pi / 2), atol=1e-12)
     gizmo.begin(SCALE_BOX, projection, *start)
     np.testing.assert_allclose(gizmo.type(0.5)[:3, :3], 0.5 * np.eye(3))
+
+
+@pytest.mark.parametrize("part", [DOT, VIEW_RING, SCALE_BOX])
+@pytest.mark.parametrize("number", [1e300, -1e300, 0.0, 1e39])
+def test_no_typed_number_leads_out_of_the_limits_of_a_pose(gizmo, projection, part, number):
+    gizmo.begin(part, projection, *projection.pixel(gizmo.frame[:3, 3]))
+    pose = Pose().moved(gizmo.type(number), gizmo.frame[:3, 3])
+    assert np.isfinite(pose.matrix(gizmo.frame[:3, 3]).astype(np.float32)).all()
+    assert SCALES[0] <= pose.scale <= SCALES[1]
 
 
 def test_gizmo_keeps_its_size_on_the_screen(projection):

@@ -52,7 +52,7 @@ class KernelArrays(NamedTuple):
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract"})
-def write_kernels(carriers, weights, motions, moved, rotations, rest, out):
+def write_kernels(carriers, weights, motions, moved, resting, rotations, rest, out):
     """Move the corners of each inscribed triangle with their carriers and write the Steiner circumellipses.
 
     In groups of nodes: their triangles are carried one by one, the ellipses are found side by side by vector
@@ -78,6 +78,7 @@ def write_kernels(carriers, weights, motions, moved, rotations, rest, out):
                 any_moved |= weights[i, 2 * c] < 1.0 and (
                     moved[carriers[i, 3 * c + 1]] or moved[carriers[i, 3 * c + 2]]
                 )
+            any_moved &= not resting[i]
             changed[i] = any_moved
             if any_moved:
                 _carry_triangle(i, lane, carriers, weights, motions, rotations, ellipses, lanes)
@@ -124,15 +125,25 @@ def _carry_triangle(i, lane, carriers, weights, motions, rotations, ellipses, la
         ax, ay, az = ax + along * x, ay + along * y, az + along * z
         bx, by, bz = bx + across * x, by + across * y, bz + across * z
     third = 1.0 / 3.0
+    mx, my, mz = third * mx, third * my, third * mz
+    # Beside a handle's rim the maps of its nodes and of those that stay differ so much that a corner may overshoot.
+    x, y, z = mx - ellipses[i, 0], my - ellipses[i, 1], mz - ellipses[i, 2]
+    square, farthest = x * x + y * y + z * z, _squared_shift(motions, ellipses, i) * (1.0 + 1e-9)
+    if square > farthest:
+        for c in range(9):
+            farthest = max(farthest, _squared_shift(motions, ellipses, carriers[i, c]))
+        if square > farthest:
+            share = math.sqrt(farthest / square)
+            mx, my, mz = ellipses[i, 0] + share * x, ellipses[i, 1] + share * y, ellipses[i, 2] + share * z
     ax, ay, az = 2.0 * third * ax, 2.0 * third * ay, 2.0 * third * az
     bx, by, bz = 2.0 * third * bx, 2.0 * third * by, 2.0 * third * bz
     for k in range(6):
         lanes[k * _LANES + lane] = ellipses[i, 3 + k]
     lanes[6 * _LANES + lane], lanes[7 * _LANES + lane], lanes[8 * _LANES + lane] = ax, ay, az
     lanes[9 * _LANES + lane], lanes[10 * _LANES + lane], lanes[11 * _LANES + lane] = bx, by, bz
-    lanes[12 * _LANES + lane] = third * mx
-    lanes[13 * _LANES + lane] = third * my
-    lanes[14 * _LANES + lane] = third * mz
+    lanes[12 * _LANES + lane] = mx
+    lanes[13 * _LANES + lane] = my
+    lanes[14 * _LANES + lane] = mz
     # Growths along the semi-axes, and that of the area between them: all squared.
     nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
     grow1 = ellipses[i, 9] ** 2 * (ax * ax + ay * ay + az * az)
@@ -148,6 +159,16 @@ def _carry_triangle(i, lane, carriers, weights, motions, rotations, ellipses, la
             turned1 += rotations[i, a, b] * ellipses[i, 3 + b]
             turned2 += rotations[i, a, b] * ellipses[i, 6 + b]
         lanes[(6 + a) * _LANES + lane], lanes[(9 + a) * _LANES + lane] = grow1 * turned1, grow2 * turned2
+
+
+@nb.njit(inline="always")
+def _squared_shift(motions, ellipses, j):
+    """How far the motion of a node takes its own centre, squared."""
+    px, py, pz = ellipses[j, 0], ellipses[j, 1], ellipses[j, 2]
+    x = motions[j, 0] * px + motions[j, 3] * py + motions[j, 6] * pz + motions[j, 9] - px
+    y = motions[j, 1] * px + motions[j, 4] * py + motions[j, 7] * pz + motions[j, 10] - py
+    z = motions[j, 2] * px + motions[j, 5] * py + motions[j, 8] * pz + motions[j, 11] - pz
+    return x * x + y * y + z * z
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract"})

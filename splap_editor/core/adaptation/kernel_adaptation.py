@@ -134,7 +134,8 @@ def adapt_kernels(
     moves the centres and nothing else.
 
     Inert splats move and turn with the blended motion of the nearest active ones and keep their size, except with
-    "none", where they only move. The scale across the surface never changes.
+    "none", where they only move. The scale across the surface never changes. What is held at rest stays at rest, and no
+    active splat moves farther than its own node and those that carry it.
 
     Parameters
     ----------
@@ -173,7 +174,8 @@ def adapt_kernels(
     arrays = _blank_arrays(binding, out)
     moved = np.empty(len(positions), np.bool_)
     still = STILL_SHARE * binding.ellipses.scene_scale
-    nodes = rest.means, positions, rotations, still, moved
+    resting = deformation.resting if deformation.resting is not None else np.zeros(len(positions), np.bool_)
+    nodes = rest.means, positions, rotations, resting, still, moved
     if method == "none":
         find_moved(*nodes)
         _move_centers(rest, positions, moved, arrays)
@@ -183,12 +185,11 @@ def adapt_kernels(
         if method == "surface":
             find_motions(binding.stencils, binding.inverse_moments, binding.dampings, *nodes, motions)
         else:
-            assert binding.graph is not None, "asked for at the door"
             find_ring_motions(hops, binding.graph.indptr, binding.graph.indices, *nodes, motions)
             # Each splat carries itself.
             carriers = np.repeat(np.arange(len(positions), dtype=np.int32)[:, None], 9, axis=1)
             weights = np.tile(np.array([1.0, 0.0], np.float32), (len(positions), 3))
-        write_kernels(carriers, weights, motions, moved, rotations, rest, arrays)
+        write_kernels(carriers, weights, motions, moved, resting, rotations, rest, arrays)
         binding.spare_motions.append(motions)
     adapt_inert(binding.inert_carriers, binding.inert_weights, rest, positions, rotations, moved, arrays)
     return AdaptedKernels(binding, arrays)

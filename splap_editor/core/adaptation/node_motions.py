@@ -14,20 +14,20 @@ STILL_ROTATION = 1e-10
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract"})
-def find_moved(rest, positions, rotations, still, moved):
-    """Mark the nodes that are displaced by more than ``still`` along an axis, or turned."""
+def find_moved(rest, positions, rotations, resting, still, moved):
+    """Mark the nodes, but those held at rest, that are displaced by more than ``still`` along an axis, or turned."""
     for i in range(len(positions)):
-        moved[i] = _has_moved(i, rest, positions, rotations, still)
+        moved[i] = not resting[i] and _has_moved(i, rest, positions, rotations, still)
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract"})
-def find_motions(stencils, inverse_moments, dampings, rest, positions, rotations, still, moved, motions):
+def find_motions(stencils, inverse_moments, dampings, rest, positions, rotations, resting, still, moved, motions):
     """Affine map x ↦ A x + b of each node's neighbourhood, as the columns of A and then b.
 
     A node that `find_moved` would not mark has the identity.
     """
     for i in range(len(positions)):
-        moved[i] = _has_moved(i, rest, positions, rotations, still)
+        moved[i] = not resting[i] and _has_moved(i, rest, positions, rotations, still)
         if not moved[i]:
             for k in range(12):
                 motions[i, k] = 1.0 if k == 0 or k == 4 or k == 8 else 0.0
@@ -75,7 +75,7 @@ def find_motions(stencils, inverse_moments, dampings, rest, positions, rotations
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract"})
-def find_ring_motions(hops, indptr, indices, rest, positions, rotations, still, moved, motions):
+def find_ring_motions(hops, indptr, indices, rest, positions, rotations, resting, still, moved, motions):
     """Least-squares affine map of each node's ``hops``-ring, as in `find_motions`; moved if any of the ring is."""
     n = len(positions)
     seen = np.full(n, -1, np.int64)
@@ -98,12 +98,13 @@ def find_ring_motions(hops, indptr, indices, rest, positions, rotations, still, 
         cross[:] = 0.0
         for k in range(end):
             j = ring[k]
-            moved[i] |= _has_moved(j, rest, positions, rotations, still)
+            moved[i] |= not resting[j] and _has_moved(j, rest, positions, rotations, still)
             for a in range(3):
                 for b in range(3):
                     edge = rest[j, b] - rest[i, b]
                     moments[a, b] += edge * (rest[j, a] - rest[i, a])
                     cross[a, b] += edge * (positions[j, a] - positions[i, a])
+        moved[i] &= not resting[i]
         trace = moments[0, 0] + moments[1, 1] + moments[2, 2]
         # Directions that the ring does not span turn with the node; the share is too small to be felt in the others.
         damping = 1e-6 if trace > 1e-90 else 1.0

@@ -14,7 +14,7 @@ from splap_editor.core.arap.coarse import CoarseArap
 from splap_editor.core.arap.handle_motion import turns_left_open
 from splap_editor.core.arap.libigl_arap import libigl_arap, triangle_components
 from splap_editor.core.arap.minimiser import ArapMinimiser, approached
-from splap_editor.core.arap.problem import FREE, PIN, ArapProblem, Constraints, Pose
+from splap_editor.core.arap.problem import FREE, ArapProblem, Constraints, Pose
 from splap_editor.core.arap.rigid_parts import LooseParts, RigidComponents
 from splap_editor.core.arap.scene import ArapScene
 from splap_editor.core.arap.settled_offset import SettledOffset
@@ -151,11 +151,15 @@ class ArapDeformer:
         handles = self.handles
         labels = np.full(len(self.rest), FREE, np.int32)
         labels[handles.indices] = handles.labels
+        # A pin by itself is a pivot, about which its splat turns.
+        resting = handles.resting(len(labels))
+        pins = np.flatnonzero(resting)
+        resting[pins] = self.scene.W[pins] @ (labels != FREE).astype(np.float64) != 0.0
+        self._resting = resting
         clamped = np.zeros(len(labels), bool)
         if self._beta > 0.0:
             clamped[labels >= 0] = True
-            pins = np.flatnonzero(labels == PIN)
-            clamped[pins] = self.scene.W[pins] @ (labels != FREE).astype(np.float64) != 0.0
+            clamped |= resting
         else:
             moving = labels >= 0
             clamped[moving] = turns_left_open(handles, self.rest)[labels[moving]]
@@ -199,7 +203,7 @@ class ArapDeformer:
         pose = self._held_pose(transforms)
         if self._rigid.follow(transforms, pose):
             self._loose.follow(pose)
-            return Deformation(pose.positions, pose.rotations)
+            return Deformation(pose.positions, pose.rotations, resting=self._resting)
         if self._dragged is None:
             self._dragged = self._approached(transforms, no_progress)
         else:
@@ -247,7 +251,7 @@ class ArapDeformer:
             return self._by_alternation(transforms, pose, progress)
         if self._rigid.follow(transforms, pose):
             self._loose.follow(pose)
-            return Deformation(pose.positions, pose.rotations)
+            return Deformation(pose.positions, pose.rotations, resting=self._resting)
         dragged = self._approached(transforms, part_of(progress, 0.0, 0.3))
         start = self._held_pose(transforms)
         self._spread(dragged, transforms, start)
@@ -301,7 +305,7 @@ class ArapDeformer:
         problem.fit_rotations(rows)
         problem.spread(rows, pose)
         self._loose.follow(pose)
-        return Deformation(pose.positions, pose.rotations, np.inf, self.options.iterations)
+        return Deformation(pose.positions, pose.rotations, np.inf, self.options.iterations, self._resting)
 
     def _by_libigl(self, transforms: NDArray[np.float64], pose: Pose) -> Deformation:
         """The reference implementation's positions, with rotations fitted to them."""
@@ -313,7 +317,7 @@ class ArapDeformer:
         problem.fit_rotations(rows)
         problem.spread(rows, pose)
         self._loose.follow(pose)
-        return Deformation(pose.positions, pose.rotations, np.inf, self.options.iterations)
+        return Deformation(pose.positions, pose.rotations, np.inf, self.options.iterations, self._resting)
 
     def _checked(self, transforms: NDArray[np.float64]) -> NDArray[np.float64]:
         transforms = np.asarray(transforms, np.float64)
@@ -331,7 +335,7 @@ class ArapDeformer:
     def _finished(self, pose: Pose, transforms: NDArray[np.float64], residual: float, n_iterations: int) -> Deformation:
         self._rigid.follow(transforms, pose)
         self._loose.follow(pose)
-        return Deformation(pose.positions, pose.rotations, residual, n_iterations)
+        return Deformation(pose.positions, pose.rotations, residual, n_iterations, self._resting)
 
 
 class _Report:

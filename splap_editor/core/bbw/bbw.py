@@ -214,6 +214,7 @@ class BbwDeformer:
     def _bind(self, rest, handles, weights, options, report):
         self._rest = np.ascontiguousarray(rest, np.float64)
         self._handles = handles
+        self._resting = handles.resting(len(self._rest))
         self._options = options
         self.sparse_weights = weights
         self.report = report
@@ -251,7 +252,7 @@ class BbwDeformer:
             positions, rotations = blended_dual_quaternion(
                 self._rest, self.sparse_weights, transforms, self._handles.centers
             )
-        return Deformation(positions, rotations)
+        return Deformation(positions, rotations, resting=self._resting)
 
     def solve(
         self,

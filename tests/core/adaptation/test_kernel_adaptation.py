@@ -428,3 +428,34 @@ def test_rejects_what_does_not_belong_together():
         adapt_kernels(binding, replace(still, rotations=np.zeros((100, 4))))
     with pytest.raises(ValueError, match="adapted kernels are of 100 splats, the scene has 90"):
         adapted_splats(other, adapt_kernels(binding, still))
+
+
+@pytest.mark.parametrize("method", ["surface", "affine", "none"])
+def test_no_splat_moves_farther_than_its_node_and_its_carriers(method):
+    binding = bound(ball(300))
+    rest = binding.ellipses.centers
+    rng = np.random.default_rng(0)
+    # Neighbours torn apart, as beside the rim of a handle among pins.
+    shifts = np.where(rng.random(len(rest)) < 0.2, 1.0, 0.0)[:, None] * np.array([0.0, 0.3, 1.0])
+    deformation = Deformation(rest + shifts, np.tile(np.eye(3), (len(rest), 1, 1)))
+    adapted = adapt_kernels(binding, deformation, method=method)
+    shifted = np.linalg.norm(adapted.means[binding.ellipses.rows] - rest, axis=1)
+    around = np.concatenate([np.arange(len(rest))[:, None], binding.carriers], axis=1)
+    assert (shifted <= np.linalg.norm(shifts, axis=1)[around].max(axis=1) * (1.0 + 1e-9) + 1e-12).all()
+    assert (shifted > 0.0).any()
+
+
+def test_what_is_held_at_rest_keeps_its_bits_whatever_moves_beside_it():
+    binding = bound(ball(300))
+    rest = binding.ellipses.centers
+    moving = np.arange(len(rest)) % 5 == 0
+    deformation = Deformation(
+        rest + moving[:, None] * np.array([0.0, 0.3, 1.0]),
+        TURN.as_matrix()[None].repeat(len(rest), axis=0),
+        resting=~moving,
+    )
+    for method, hops in (("surface", 1), ("affine", 1), ("affine", 2), ("none", 1)):
+        adapted = adapt_kernels(binding, deformation, method=method, hops=hops)
+        changed = adapted.changed[binding.ellipses.rows]
+        assert changed[moving].any() and not changed[~moving].any()
+        np.testing.assert_array_equal(adapted.means[binding.ellipses.rows][~moving], rest[~moving])
