@@ -17,6 +17,7 @@ from PySide6.QtWidgets import QApplication
 from splap_editor.engine.cache import StageCache
 from splap_editor.installation.desktop_entry import APP_ID
 from splap_editor.session.autosave import Autosave
+from splap_editor.session.crash_report import CrashReport
 from splap_editor.session.documents import Documents
 from splap_editor.session.jobs import Job
 from splap_editor.session.session import Session
@@ -30,6 +31,7 @@ from splap_editor.tools.transform_tool import TransformTool
 from splap_editor.ui.actions.file_commands import sample_path
 from splap_editor.ui.collector import MainThreadCollector
 from splap_editor.ui.display import Display
+from splap_editor.ui.end_signals import EndSignals
 from splap_editor.ui.main_window import MainWindow
 from splap_editor.ui.theme import apply_theme
 from splap_editor.ui.viewport_widget import ViewportWidget, surface_format
@@ -82,8 +84,20 @@ def run(path: Path | None = None) -> int:
     sys.excepthook = _shows_in(window)
     window.show()
     window.recovery_bar.look()
+    crash_report = CrashReport()
+    told: list[int] = []
+
+    def end(number: int) -> None:
+        told.append(number)
+        window.leave_at_once()
+        app.quit()
+
+    signals = EndSignals(end, window)
     QTimer.singleShot(0, lambda: _open_first(window, path or sample_path()))
-    return app.exec()
+    code = app.exec()
+    signals.close()
+    crash_report.close()
+    return 128 + told[0] if told else code
 
 
 def _tell_taskbar() -> None:

@@ -3,11 +3,16 @@
 import contextlib
 import errno
 import os
+import re
 import secrets
 import stat
 from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
+
+from splap_editor.io.file_lock import FileLock, holds_lock
+
+_PART = re.compile(r"\..+\.[0-9a-f]{12}\.part")
 
 
 @contextlib.contextmanager
@@ -18,7 +23,7 @@ def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     flushes them to the disk and renames the file over ``path``; leaving it by
     an exception removes the temporary file and leaves ``path`` as it was. A
     killed process can leave a ``.name.*.part`` file behind, never a broken
-    ``path``.
+    ``path``; the next write to the directory clears it away.
 
     Parameters
     ----------
@@ -40,9 +45,8 @@ def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     """
     target = Path(os.path.realpath(path))
     mode = _mode_to_keep(target)
-    temporary = target.with_name(f".{target.name[:80]}.{secrets.token_hex(6)}.part")
-    # 0o666 is cut down by the umask, as for any new file.
-    handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+    _clear_abandoned(target.parent)
+    handle, temporary = _new_part(target)
     try:
         with os.fdopen(handle, "wb") as file:
             yield file
@@ -56,6 +60,28 @@ def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
             os.unlink(temporary)
         raise
     _sync_directory(target.parent)
+
+
+def _new_part(target: Path) -> tuple[int, Path]:
+    """Make a temporary file beside a target, and lock it as long as its writer lives."""
+    while True:
+        temporary = target.with_name(f".{target.name[:80]}.{secrets.token_hex(6)}.part")
+        # 0o666 is cut down by the umask, as for any new file.
+        handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+        if holds_lock(handle, temporary):
+            return handle, temporary
+        # Another process took it for abandoned in the moment between making and locking.
+        os.close(handle)
+
+
+def _clear_abandoned(directory: Path) -> None:
+    """Remove the temporary files that dead processes left in a directory; those of living ones are locked."""
+    with contextlib.suppress(OSError):
+        with os.scandir(directory) as entries:
+            names = [entry.name for entry in entries if _PART.fullmatch(entry.name)]
+        for name in names:
+            with contextlib.suppress(OSError):
+                FileLock(directory / name).remove()
 
 
 def _mode_to_keep(target: Path) -> int | None:

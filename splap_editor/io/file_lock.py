@@ -2,10 +2,9 @@
 
 import contextlib
 import os
-import sys
 from pathlib import Path
 
-if sys.platform == "win32":
+if os.name == "nt":
     import msvcrt
 else:
     import fcntl
@@ -56,8 +55,25 @@ class FileLock:
             self._handle = None
 
 
+def holds_lock(handle: int, path: Path) -> bool:
+    """Lock an open file until it is closed; whether that worked and the file is still there.
+
+    Where the file system knows no locks it counts as locked. On Windows, where
+    nobody removes an open file, none is needed.
+    """
+    if os.name == "nt":
+        return True
+    try:
+        _lock(handle)
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True
+    return _is_same(handle, path)
+
+
 def _lock(handle: int) -> None:
-    if sys.platform == "win32":
+    if os.name == "nt":
         msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
     else:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)

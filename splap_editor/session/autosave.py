@@ -1,4 +1,4 @@
-"""Autosave: the edit in the user's state folder, a few seconds behind what is on screen."""
+"""Autosave: the edit in the user's state folder, half a second behind what is on screen."""
 
 import threading
 from dataclasses import replace
@@ -8,19 +8,20 @@ from time import monotonic
 from splap_editor.io.session_file import write_session_file
 from splap_editor.session.documents import Documents
 from splap_editor.session.jobs import Post
-from splap_editor.session.recovery import Orphan, RecoverySlot, new_slot, orphans, recovery_folder
+from splap_editor.session.recovery import LeftBehind, Orphan, RecoverySlot, left_behind, new_slot, recovery_folder
 from splap_editor.session.saved_state import SavedState
 from splap_editor.session.signals import Signal
 
-DELAY_S = 3.0
+DELAY_S = 0.25
+"""The write itself takes the rest of the half second after which an edit is safe."""
 
 
 class Autosave:
     """Keeps the newest state that is in no session file in one recovery file, and none when all is saved.
 
     The file is written on a thread of its own, whole or not at all. A process
-    that ends by `close` removes it; one that dies leaves it for the next
-    start, which finds it by `orphans`.
+    that ends by `close` removes it; one that dies, or is told to, leaves it
+    for the next start, which finds it by `left_behind`.
 
     Parameters
     ----------
@@ -48,29 +49,38 @@ class Autosave:
         self._document: Path | None = None
         self._due: float | None = None
         self._is_closing = False
+        self._keeps = False
         self._has_failed = False
         self._wake = threading.Condition()
         self._thread = threading.Thread(target=self._run, name="splap-autosave", daemon=True)
         self._thread.start()
         documents.changed.connect(self._on_changed)
 
-    def orphans(self) -> list[Orphan]:
+    def left_behind(self) -> LeftBehind:
         """Edits that other processes left behind when they died, the newest first."""
-        return orphans(self._folder)
+        return left_behind(self._folder)
 
     def restore(self, orphan: Orphan) -> None:
         """Bring an edit back; its file becomes the recovery file of this process once it is on screen."""
         self._documents.recover(orphan.session, lambda: self._adopt(orphan.slot))
 
-    def close(self) -> None:
-        """End cleanly: nothing is left to recover."""
+    def close(self, *, keep: bool = False) -> None:
+        """End cleanly: nothing is left to recover.
+
+        Parameters
+        ----------
+        keep : bool
+            Write what is not written yet, and leave it for the next start: nobody was asked about it.
+        """
         self._documents.changed.disconnect(self._on_changed)
         with self._wake:
-            self._is_closing = True
+            self._is_closing, self._keeps = True, keep
             self._wake.notify()
         self._thread.join()
         for slot in (self._slot, self._adopted):
-            if slot is not None:
+            if slot is not None and keep and slot.path.exists():
+                slot.lock.release()
+            elif slot is not None:
                 slot.remove()
         self._slot = self._adopted = None
 
@@ -95,7 +105,8 @@ class Autosave:
             with self._wake:
                 while not self._is_closing and (self._due is None or self._due > monotonic()):
                     self._wake.wait(None if self._due is None else max(self._due - monotonic(), 0.0))
-                if self._is_closing:
+                is_last = self._is_closing
+                if is_last and (self._due is None or not self._keeps):
                     return
                 state, document, self._due = self._wanted, self._document, None
                 adopted, self._adopted = self._adopted, None
@@ -106,6 +117,8 @@ class Autosave:
             else:
                 self._has_failed = False
                 self._post(lambda state=state: self.written.emit(state))
+            if is_last:
+                return
 
     def _keep(self, state: SavedState | None, document: Path | None, adopted: RecoverySlot | None) -> None:
         if adopted is not None:

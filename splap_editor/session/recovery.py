@@ -9,14 +9,19 @@ from pathlib import Path
 import platformdirs
 
 from splap_editor.io.file_lock import FileLock
-from splap_editor.io.session_file import SUFFIX, SessionFileError, read_session_file
+from splap_editor.io.session_file import SUFFIX, read_session_file
 from splap_editor.io.session_specs import SessionFile
 
 
-def recovery_folder() -> Path:
-    """Folder in the user's state folder, or in ``SPLAP_STATE_DIR``."""
+def state_folder() -> Path:
+    """Folder for what outlives a process: the user's state folder, or ``SPLAP_STATE_DIR``."""
     named = os.environ.get("SPLAP_STATE_DIR")
-    return (Path(named) if named else Path(platformdirs.user_state_dir("splap-editor"))) / "recovery"
+    return Path(named) if named else Path(platformdirs.user_state_dir("splap-editor"))
+
+
+def recovery_folder() -> Path:
+    """Where recovery files are kept."""
+    return state_folder() / "recovery"
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,17 +79,36 @@ class Orphan:
         self.slot.lock.release()
 
 
-def orphans(folder: Path) -> list[Orphan]:
-    """Find the edits that dead processes left in a folder, the newest first.
+@dataclass(frozen=True, eq=False)
+class LeftBehind:
+    """What dead processes left in a folder.
 
-    Files of living processes are left alone, and so are those that cannot be
-    read; locks and half-written files without an edit are cleared away.
+    Parameters
+    ----------
+    orphans : list of Orphan
+        The newest first.
+    set_aside : list of Path
+        Files that no edit could be read from, by the names they have now.
     """
-    found = []
+
+    orphans: list[Orphan]
+    set_aside: list[Path]
+
+
+def left_behind(folder: Path) -> LeftBehind:
+    """Find the edits that dead processes left in a folder.
+
+    Files of living processes are left alone. One that cannot be read gets
+    another name, under which no later start looks at it; locks and
+    half-written files without an edit are cleared away.
+    """
+    found, set_aside = [], []
     for path in sorted(folder.glob(f"*{SUFFIX}")):
         orphan = _orphan(path)
-        if orphan is not None:
+        if isinstance(orphan, Orphan):
             found.append(orphan)
+        elif orphan is not None:
+            set_aside.append(orphan)
     for path in folder.glob("*.lock"):
         with contextlib.suppress(OSError):
             slot = RecoverySlot(path.with_suffix(SUFFIX), FileLock(path))
@@ -92,19 +116,27 @@ def orphans(folder: Path) -> list[Orphan]:
                 slot.lock.release()
             else:
                 slot.remove()
-    return sorted(found, key=lambda orphan: -orphan.saved_at)
+    return LeftBehind(sorted(found, key=lambda orphan: -orphan.saved_at), set_aside)
 
 
-def _orphan(path: Path) -> Orphan | None:
+def _orphan(path: Path) -> Orphan | Path | None:
+    """The edit in a file, or the name the file was given since there is none; None if another process has it."""
     try:
         lock = FileLock(_lock_path(path))
     except OSError:
         return None
     try:
         return Orphan(RecoverySlot(path, lock), read_session_file(path), path.stat().st_mtime)
-    except (OSError, SessionFileError):
-        lock.release()
-        return None
+    # Whatever is wrong with one file, the program must start and offer the others.
+    except Exception:
+        aside = path.with_name(path.name + ".unreadable")
+        try:
+            path.rename(aside)
+        except OSError:
+            lock.release()
+            return None
+        lock.remove()
+        return aside
 
 
 def _lock_path(path: Path) -> Path:

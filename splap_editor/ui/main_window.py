@@ -107,6 +107,7 @@ class MainWindow(FileDrop, QMainWindow):
         self.session, self.viewport, self.view, self.tools, self.display = session, viewport, view, tools, display
         self.documents, self.autosave = documents, autosave
         self._may_close = False
+        self._keeps_edit = False
         self._has_hinted = QSettings().value("hint/done", False, type=bool)
         self.overlay = Overlay(context.hud, viewport)
         self.weight_legend = WeightLegend(view.weights, viewport)
@@ -377,12 +378,17 @@ class MainWindow(FileDrop, QMainWindow):
         self.timeline_commands.player.stop()
         self.tools.cancel()
         self.recovery_bar.release()
-        self.autosave.close()
+        self.autosave.close(keep=self._keeps_edit)
         self.documents.close()
         self.session.close()
         self.view.close()
         self.viewport.close()
         event.accept()
+
+    def leave_at_once(self) -> None:
+        """Close without asking, since nobody may be there to answer; its edit is kept for the next start."""
+        self._keeps_edit = True
+        self._close_for_good()
 
     def _close_for_good(self) -> None:
         self._may_close = True

@@ -94,6 +94,39 @@ def test_a_write_protected_file_is_not_replaced(tmp_path, monkeypatch):
     assert os.listdir(tmp_path) == ["a"]
 
 
+ABANDONED = """
+import os, signal, sys
+from splap_editor.io.atomic_file import atomic_file
+with atomic_file(sys.argv[1]) as file:
+    file.write(b"half")
+    file.flush()
+    if sys.argv[2] == "live":
+        print("writing", flush=True)
+        sys.stdin.read()
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def writer(path, how):
+    env = {**os.environ, "PYTHONPATH": str(Path(splap_editor.__file__).parents[1])}
+    streams = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    return subprocess.Popen([sys.executable, "-c", ABANDONED, str(path), how], env=env, **streams)
+
+
+def test_the_next_write_clears_what_dead_processes_left_and_nothing_of_living_ones(tmp_path):
+    with writer(tmp_path / "live", "live") as live:
+        assert live.stdout.readline() == b"writing\n"
+        with writer(tmp_path / "dead", "dead") as dead:
+            dead.wait(60)
+        (tmp_path / ".not.ours.part").write_bytes(b"kept")
+        assert {name[:6] for name in os.listdir(tmp_path)} == {".dead.", ".live.", ".not.o"}
+        with atomic_file(tmp_path / "a") as file:
+            file.write(b"x")
+        assert {name[:6] for name in os.listdir(tmp_path)} == {"a", ".live.", ".not.o"}
+        live.stdin.close()
+        live.wait(60)
+
+
 def splat_file(tmp_path):
     (tmp_path / "in.ply").write_bytes(ply_bytes(splat_columns(500, np.random.default_rng(0), n_rest=45)))
     return read_ply(tmp_path / "in.ply")

@@ -19,9 +19,10 @@ from splap_editor.io.file_lock import FileLock
 from splap_editor.io.session_file import read_session_file, write_session_file
 from splap_editor.io.session_specs import PlySpec, SessionFile
 from splap_editor.resources import resource
-from splap_editor.session.autosave import Autosave
+from splap_editor.session.autosave import DELAY_S, Autosave
 from splap_editor.session.documents import Documents
-from splap_editor.session.recovery import new_slot, orphans, recovery_folder
+from splap_editor.session.recovery import left_behind as found_in
+from splap_editor.session.recovery import new_slot, recovery_folder
 from splap_editor.session.session import Session
 
 from .main_thread import MainThread
@@ -130,7 +131,7 @@ def test_undoing_back_to_the_saved_state_leaves_nothing_to_recover(desk):
 def test_files_of_living_processes_are_left_alone(desk):
     desk.open()
     desk.move(0.25)
-    assert desk.autosave.orphans() == []
+    assert desk.autosave.left_behind().orphans == []
     assert len(desk.files) == 1
 
 
@@ -138,8 +139,8 @@ def test_an_orphan_comes_back_with_its_document_and_stays_recoverable_until_save
     document = tmp_path / "work.splap"
     left_behind(desk.folder, 0.75, document=document)
     desk.open()
-    (orphan,) = desk.autosave.orphans()
-    assert desk.autosave.orphans() == [], "one start at a time is offered an edit"
+    (orphan,) = desk.autosave.left_behind().orphans
+    assert desk.autosave.left_behind().orphans == [], "one start at a time is offered an edit"
     before = desk.scene
     desk.autosave.restore(orphan)
     desk.main.run_until(lambda: desk.scene is not before)
@@ -159,7 +160,7 @@ def test_an_orphan_whose_capture_is_gone_is_kept(desk, tmp_path):
     write_session_file(
         path, SessionFile(PlySpec(str(tmp_path / "gone.ply"), "", 1), held.recipe, held.handles, document="")
     )
-    (orphan,) = desk.autosave.orphans()
+    (orphan,) = desk.autosave.left_behind().orphans
     desk.autosave.restore(orphan)
     desk.main.run_until(lambda: desk.failures)
     assert "gone.ply is not where" in str(desk.failures[0])
@@ -169,22 +170,63 @@ def test_an_orphan_whose_capture_is_gone_is_kept(desk, tmp_path):
 
 def test_a_discarded_orphan_is_gone(desk):
     left_behind(desk.folder)
-    (orphan,) = desk.autosave.orphans()
+    (orphan,) = desk.autosave.left_behind().orphans
     orphan.slot.remove()
     assert list(desk.folder.iterdir()) == []
 
 
-def test_the_newest_orphan_comes_first_and_unreadable_ones_are_passed_over(tmp_path):
+def test_the_newest_orphan_comes_first(tmp_path):
     folder = tmp_path / "recovery"
     first, second = left_behind(folder, 1.0), left_behind(folder, 2.0)
     os.utime(first, (1e9, 1e9))
-    (folder / "broken.splap").write_bytes(b"{")
     (folder / "1-aa.lock").touch()
-    found = orphans(folder)
+    found = found_in(folder).orphans
     assert [orphan.slot.path for orphan in found] == [second, first]
-    assert (folder / "broken.splap").exists() and not (folder / "1-aa.lock").exists()
+    assert not (folder / "1-aa.lock").exists()
     for orphan in found:
         orphan.slot.remove()
+
+
+@pytest.mark.parametrize("content", [b"{", b"", b"\xff", b'{"version": ' + b"9" * 5000 + b"}", b"[" * 100_000, None])
+def test_a_file_without_an_edit_is_set_aside_once_and_the_others_are_offered(tmp_path, content):
+    folder = tmp_path / "recovery"
+    whole = left_behind(folder)
+    broken = folder / "broken.splap"
+    broken.write_bytes(content) if content is not None else broken.mkdir()
+    found = found_in(folder)
+    assert [orphan.slot.path for orphan in found.orphans] == [whole]
+    assert found.set_aside == [folder / "broken.splap.unreadable"] and found.set_aside[0].exists()
+    found.orphans[0].release()
+    again = found_in(folder)
+    assert len(again.orphans) == 1 and again.set_aside == []
+    again.orphans[0].slot.remove()
+
+
+def test_a_process_told_to_end_writes_what_is_not_written_and_leaves_it(tmp_path):
+    desk = Desk(tmp_path / "recovery", delay_s=3600.0)
+    desk.open()
+    desk.session.add_handle(Region(np.zeros(3), 0.1), pose=Pose((0.25, 0.0, 0.0)))
+    desk.autosave.close(keep=True)
+    desk.documents.close()
+    desk.session.close()
+    (orphan,) = found_in(desk.folder).orphans
+    assert orphan.session.recipe.handles[0].translate == (0.25, 0.0, 0.0)
+    orphan.slot.remove()
+
+
+def test_a_process_told_to_end_with_nothing_to_lose_leaves_nothing(tmp_path):
+    desk = Desk(tmp_path / "recovery")
+    desk.open()
+    desk.move(0.25)
+    desk.session.history.undo()
+    desk.autosave.close(keep=True)
+    desk.documents.close()
+    desk.session.close()
+    assert list(desk.folder.iterdir()) == []
+
+
+def test_an_edit_is_written_within_half_a_second():
+    assert DELAY_S <= 0.25
 
 
 def test_a_folder_that_cannot_be_written_is_said_once(tmp_path):
@@ -275,7 +317,7 @@ def test_a_process_killed_at_any_moment_leaves_the_old_or_the_new_state_whole(tm
             asked = max(int(line.split()[1]) for line in lines if line.startswith(b"does"))
             kept = max((int(line.split()[1]) for line in lines if line.startswith(b"kept")), default=0)
             left = sorted(folder.glob("*.splap"))
-            found = orphans(folder)
+            found = found_in(folder).orphans
             assert len(found) == len(left) <= 1, "a recovery file is whole, or it is not there"
             states = [orphan.session for orphan in found]
             if document.exists():
