@@ -42,8 +42,8 @@ class SpdFactor:
         if not np.isfinite(A.data).all():
             raise ValueError("A must be finite")
         self.n: int = A.shape[0]
+        self.nnz = 0
         if self.n == 0:
-            self.nnz = 0
             return
         if not (A.diagonal() > 0).all():
             raise NotPositiveDefiniteError("A must be positive definite: it has a zero or negative diagonal entry")
@@ -62,7 +62,7 @@ class SpdFactor:
         self._inverse_pivots = 1.0 / np.asarray(pivots, np.float64)
         self._order = np.ascontiguousarray(order, np.uint32)
         self._groups = _column_groups(self._indptr, self._indices)
-        self.nnz: int = self.n + len(self._data)
+        self.nnz = self.n + len(self._data)
 
     def solve(self, b: NDArray[np.float64]) -> NDArray[np.float64]:
         """Solve ``A x = b``.

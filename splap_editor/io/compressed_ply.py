@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from splap_editor.core.splats.splats import Splats
 from splap_editor.io.layout import Layout, PlyEvidence
 from splap_editor.io.ply_header import PlyError
-from splap_editor.io.ply_table import PlyTable
+from splap_editor.io.ply_table import PlyTable, field_types
 from splap_editor.io.splat_columns import SH_C0, column_group
 
 CHUNK = 256
@@ -51,10 +51,10 @@ def packed_splats(evidence: PlyEvidence, layout: Layout) -> tuple[Splats, list[s
         )
     if any(element.has_lists for element in table.header.elements):
         raise PlyError(f"{table.name} is damaged: compressed splats have no lists. Export it again.")
-    bounds = {column: np.repeat(chunks[column].astype(np.float32), CHUNK)[:n] for column in chunks.dtype.names}
+    bounds = {column: np.repeat(chunks[column].astype(np.float32), CHUNK)[:n] for column in field_types(chunks.dtype)}
     packed = table.columns["packed_color"].astype(np.uint32)
     colour = np.stack([(packed >> shift & 255).astype(np.float32) / 255 for shift in (24, 16, 8, 0)], axis=1)
-    rgb = colour[:, :3]
+    rgb: NDArray[np.floating] = colour[:, :3]
     try:
         means = _lerped(_unit_11_10_11(table.columns["packed_position"]), bounds, "{}_x", "{}_y", "{}_z")
         scales = _lerped(
@@ -91,7 +91,7 @@ def _unit_11_10_11(packed: NDArray) -> NDArray[np.float32]:
     )
 
 
-def _lerped(share: NDArray[np.float32], bounds: dict[str, NDArray], *names: str) -> NDArray[np.float32]:
+def _lerped(share: NDArray[np.floating], bounds: dict[str, NDArray], *names: str) -> NDArray[np.float32]:
     """Columns between their chunk's bounds; either end is met exactly."""
     out = np.empty((len(share), len(names)), np.float32)
     for c, name in enumerate(names):
@@ -119,8 +119,9 @@ def _harmonics(table: PlyTable) -> NDArray[np.float32]:
     rows = table.element("sh")
     if rows is None:
         return np.zeros((n, 0, 3), np.float32)
-    names = tuple(f"f_rest_{i}" for i in range(len(rows.dtype.names)))
-    if len(rows) != n or len(names) not in (9, 24, 45, 72) or set(names) != set(rows.dtype.names):
+    held = field_types(rows.dtype)
+    names = tuple(f"f_rest_{i}" for i in range(len(held)))
+    if len(rows) != n or len(names) not in (9, 24, 45, 72) or set(names) != held.keys():
         raise PlyError(f"{table.name} is damaged: its 'sh' element does not fit its splats. Export it again.")
     byte = column_group({name: rows[name] for name in names}, names)
     share = np.where(byte == 0, 0, np.where(byte == 255, 1, (byte + 0.5) / 256))

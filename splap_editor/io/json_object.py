@@ -4,7 +4,7 @@ import json
 import math
 from collections.abc import Callable, Iterator
 from difflib import get_close_matches
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar, overload
 
 from splap_editor.core.options import Option, options_of
 
@@ -106,15 +106,24 @@ class JsonObject:
             raise self.refuse(key, f"a finite number{bound}")
         return number
 
+    @overload
+    def vector(
+        self, key: str, size: Literal[3], default: tuple[float, ...] | None = None, *, most: float = math.inf
+    ) -> tuple[float, float, float]: ...
+    @overload
+    def vector(
+        self, key: str, size: Literal[4], default: tuple[float, ...] | None = None, *, most: float = math.inf
+    ) -> tuple[float, float, float, float]: ...
+
     def vector(
         self, key: str, size: int, default: tuple[float, ...] | None = None, *, most: float = math.inf
     ) -> tuple[float, ...]:
         """A list of finite numbers of at most that size; without a default it must be there."""
         value = self._value.get(key, default)
         # A list of any other length is not looked at further.
-        fits = isinstance(value, list | tuple) and len(value) == size
-        numbers = [_finite(item) for item in value] if fits else [None]
-        if None in numbers or max(map(abs, numbers)) > most:
+        items = value if isinstance(value, list | tuple) and len(value) == size else []
+        numbers = [number for number in map(_finite, items) if number is not None and abs(number) <= most]
+        if len(numbers) != size:
             bound = "" if most == math.inf else f" between {-most:g} and {most:g}"
             raise self.refuse(key, f"a list of {size} finite numbers{bound}")
         return tuple(numbers)

@@ -76,6 +76,10 @@ class ColumnNames:
         return (*self.means, self.opacity, *self.log_scales, *self.quats, *colours)
 
 
+COMMON_NAMES = ColumnNames()
+"""What every program reads."""
+
+
 @dataclass(frozen=True)
 class Layout:
     """What a trainer's columns mean.
@@ -113,7 +117,7 @@ class Layout:
     name: str
     reason: str
     splats: Callable[[PlyEvidence, "Layout"], tuple[Splats, list[str]]]
-    columns: ColumnNames | None = ColumnNames()
+    columns: ColumnNames | None = COMMON_NAMES
     packed: tuple[str, ...] = ()
     normal_axis: int | None = None
     activated_opacity: bool = False

@@ -146,9 +146,6 @@ LAYOUTS: dict[str, Layout] = {
 }
 """Every layout by the name that ``read_ply(layout=...)`` takes; of several that are given away the first is meant."""
 
-PLAIN = LAYOUTS["3dgs"]
-"""What every program reads, and what is written where a file's own layout cannot hold an edit."""
-
 
 def layout_of(evidence: PlyEvidence, *, chosen: str | None = None) -> Layout:
     """Recognise the layout of a table of splats.
@@ -189,7 +186,7 @@ def layout_of(evidence: PlyEvidence, *, chosen: str | None = None) -> Layout:
         places = [position.get(column, -1) for column in layout.by_order]
         if places and min(places) >= 0 and places == sorted(places):
             return replace(layout, reason="its columns and their order")
-    return PLAIN
+    return LAYOUTS["3dgs"]
 
 
 def _chosen_layout(table: PlyTable, chosen: str) -> Layout:

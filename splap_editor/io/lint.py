@@ -40,7 +40,7 @@ def unusable_rows(splats: Splats) -> list[Finding]:
     """
     scales, quats = splats.log_scales, splats.quats
     opacities = splats.logit_opacities
-    findings = []
+    findings: list[Finding] = []
     if not _finite(scales):
         bad = (np.isnan(scales) | (scales == np.inf)).any(axis=1)
         _add(findings, "scales", "{} a scale that is not a number or infinite", bad)

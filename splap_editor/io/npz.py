@@ -2,7 +2,7 @@
 
 import re
 import zipfile
-from typing import BinaryIO
+from typing import IO, Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,7 +82,7 @@ class NpzFile:
         self._left -= array.nbytes
         return array
 
-    def _opened(self, name: str, most_bytes: int | None):
+    def _opened(self, name: str, most_bytes: int | None) -> Any:
         """Shape of an array, or with a limit the array."""
         info = self._members.get(name)
         if info is None:
@@ -115,7 +115,7 @@ class NpzFile:
         return flat.reshape(shape, order="F" if found[2] == b"True" else "C")
 
 
-def _fill(member, data: NDArray[np.uint8], name: str) -> None:
+def _fill(member: IO[bytes], data: NDArray[np.uint8], name: str) -> None:
     done = 0
     while done < len(data):
         chunk = member.read(min(len(data) - done, 1 << 20))

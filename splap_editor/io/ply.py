@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.splats.splats import Splats
 from splap_editor.io.atomic_file import atomic_file
-from splap_editor.io.layout import Layout, PlyEvidence
-from splap_editor.io.layouts import PLAIN, layout_of, require_splats
+from splap_editor.io.layout import COMMON_NAMES, Layout, PlyEvidence
+from splap_editor.io.layouts import layout_of, require_splats
 from splap_editor.io.lint import unusable_rows
 from splap_editor.io.ply_header import PlyError
 from splap_editor.io.ply_reader import read_table
-from splap_editor.io.ply_table import NewColumn, PlyTable
-from splap_editor.io.splat_cells import SplatCells, plain_table
+from splap_editor.io.ply_table import NewColumn, PlyTable, field_types
+from splap_editor.io.splat_cells import SplatCells, any_stored_difference, plain_table
 from splap_editor.io.splat_columns import SplatColumns, splat_columns
 
 __all__ = ["PlyError", "SplatFile", "read_ply", "write_ply"]
@@ -95,8 +95,8 @@ class _Glance:
 
     def look(self, rows: NDArray) -> None:
         """Count the rows of a block if all their numbers are finite and no rotation begins with zero."""
-        types = {dtype for dtype, _ in rows.dtype.fields.values()}
-        if types == {np.dtype(np.float32)} and "rot_0" in rows.dtype.names:
+        types = field_types(rows.dtype)
+        if set(types.values()) == {np.dtype(np.float32)} and "rot_0" in types:
             numbers = rows.view(np.float32)
             # A NaN or an infinity stays in the sum of squares, and that is the fastest pass there is. A sum that
             # overflows costs a second pass, no more.
@@ -169,16 +169,16 @@ def write_ply(
     _require_same_shape(splats, file.splats)
     table, rest = file.table, file.splats
     names = file.layout.columns
+    if names is None and (as_3dgs or extra or any_stored_difference(rest, splats)):
+        table, names, rest = plain_table(table.name, splats), COMMON_NAMES, splats
+    added: list[NewColumn] = []
     if names is None:
-        cells = SplatCells(None, file.layout, rest, splats)
-        if as_3dgs or extra or cells.any_changed():
-            table, names = plain_table(table.name, splats), PLAIN.columns
-            rest = splats
-    columns = None if names is None else splat_columns(table, names)
-    cells = SplatCells(columns, file.layout, rest, splats, table)
-    added = _added_columns(table, columns if as_3dgs else None, extra or {})
+        blocks = table.blocks(lambda lo, hi: {}, added)
+    else:
+        columns = splat_columns(table, names)
+        added = _added_columns(table, columns if as_3dgs else None, extra or {})
+        blocks = table.blocks(SplatCells(columns, file.layout, rest, splats, table).changes, added)
     header = table.header.with_columns([(column.after, column.name) for column in added])
-    blocks = table.blocks(cells.changes, added)
     _write_blocks(Path(path), header, blocks, table.body.nbytes, progress)
 
 
@@ -217,11 +217,11 @@ def _require_same_shape(splats: Splats, rest: Splats) -> None:
 def _added_columns(table: PlyTable, thickened: SplatColumns | None, extra: Mapping[str, ArrayLike]) -> list[NewColumn]:
     """Columns to add to the file: a third scale to flat splats that shall be thickened, and extra ones."""
     added = []
-    third = PLAIN.columns.log_scales[2]
+    third = COMMON_NAMES.log_scales[2]
     if thickened is not None and third not in table.columns:
         second = thickened.log_scales[1]
         added.append(NewColumn(second, third, np.full(table.n_rows, THIN_LOG_SCALE, np.float32)))
-    last = table.header.element("vertex").names[-1]
+    last = table.header.vertex.names[-1]
     for name, values in extra.items():
         values = np.asarray(values, np.float32)
         if values.shape != (table.n_rows,):

@@ -52,7 +52,7 @@ class PlyElement:
         """Column names in file order."""
         return tuple(p.name for p in self.properties)
 
-    def dtype(self, byte_order: str) -> np.dtype:
+    def dtype(self, byte_order: str) -> np.dtype[np.void]:
         """Packed record of one row; elements with lists have none."""
         return np.dtype([(p.name, byte_order + p.type) for p in self.properties])
 
@@ -100,6 +100,13 @@ class PlyHeader:
     def element(self, name: str) -> PlyElement | None:
         """Return the element of that name, or None."""
         return next((e for e in self.elements if e.name == name), None)
+
+    @property
+    def vertex(self) -> PlyElement:
+        """The element that holds the splats; a header without one has been refused."""
+        vertex = self.element("vertex")
+        assert vertex is not None
+        return vertex
 
     def smallest_body(self) -> int:
         """Fewest bytes that must follow the header for it to be true."""

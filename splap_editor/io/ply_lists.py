@@ -1,14 +1,14 @@
 """Binary PLY files with list properties: read by plyfile, row by row."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from io import BytesIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.io.ply_header import PlyError, PlyHeader
-from splap_editor.io.ply_table import CellChanges, NewColumn, PlyTable, cast_values
+from splap_editor.io.ply_table import CellChanges, NewColumn, PlyTable, cast_values, field_types
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +23,7 @@ class ListTable(PlyTable):
         What follows the last element, kept.
     """
 
-    elements: dict[str, NDArray] | None = None
+    elements: dict[str, NDArray] = field(default_factory=dict)
     tail: bytes = b""
 
     def element(self, name: str) -> NDArray | None:
@@ -62,7 +62,7 @@ def list_table(name: str, header: PlyHeader, body: NDArray[np.uint8]) -> ListTab
     except (plyfile.PlyParseError, ValueError, EOFError, OverflowError) as error:
         raise PlyError(f"{name} is damaged or cut short ({error}). Copy or export it again.") from error
     elements = {element.name: element.data for element in ply.elements}
-    scalar = [p.name for p in header.element("vertex").properties if p.length_type is None]
+    scalar = [p.name for p in header.vertex.properties if p.length_type is None]
     columns = {column: elements["vertex"][column] for column in scalar}
     tail = body[stream.tell() - len(plain) :].tobytes()
     return ListTable(name, header, body, columns, elements, tail)
@@ -77,11 +77,11 @@ def _plain_header(header: PlyHeader) -> bytes:
 def _with_columns(rows: NDArray, new_columns: list[NewColumn]) -> NDArray:
     """Rows with float columns added after existing ones."""
     fields = []
-    for name in rows.dtype.names:
-        fields.append((name, rows.dtype[name]))
+    for name, dtype in field_types(rows.dtype).items():
+        fields.append((name, dtype))
         fields += [(c.name, np.dtype("f4")) for c in new_columns if c.after == name]
     wide = np.empty(len(rows), fields)
-    for name in rows.dtype.names:
+    for name in field_types(rows.dtype):
         wide[name] = rows[name]
     for column in new_columns:
         wide[column.name] = column.values
@@ -99,13 +99,13 @@ def _body(header: PlyHeader, elements: dict[str, NDArray]) -> bytes:
     for element in header.elements:
         rows = elements[element.name]
         if not element.has_lists:
-            fields = [(name, rows.dtype[name].newbyteorder(order)) for name in rows.dtype.names]
+            fields = [(name, order + dtype.str[1:]) for name, dtype in field_types(rows.dtype).items()]
             parts.append(rows.astype(fields).tobytes())
             continue
         types = {p.name: (np.dtype(order + p.type), p.length_type) for p in element.properties}
         float_type = (np.dtype(order + "f4"), None)
         for row in rows:
-            for name in rows.dtype.names:
+            for name in field_types(rows.dtype):
                 # Columns that the header does not have are added ones.
                 dtype, length_type = types.get(name, float_type)
                 if length_type is not None:

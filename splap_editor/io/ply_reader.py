@@ -2,8 +2,8 @@
 
 import os
 from collections.abc import Callable
+from io import FileIO
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,7 +72,7 @@ def read_table(
 
 
 def _read_body(
-    file: BinaryIO,
+    file: FileIO,
     body: NDArray[np.uint8],
     header: PlyHeader,
     name: str,
@@ -80,18 +80,18 @@ def _read_body(
     progress: Progress,
 ) -> None:
     """Fill the body from the file, block by block."""
-    rows, start = None, 0
+    rows, start = body[:0], 0
     if glance is not None and codec_of(header).has_row_views:
         table = PlyTable(name, header, body)
-        rows = table.element("vertex")
+        rows = table.rows
         start = table.offset_of(rows)
     n_seen, next_report = 0, 0.0
     for lo in range(0, len(body), _READ_BYTES):
         wanted = body[lo : lo + _READ_BYTES]
-        if file.readinto(wanted) != len(wanted):
+        if file.readinto(wanted.data) != len(wanted):
             raise PlyError(f"{name} became shorter while it was read. Open it again once it is written.")
         hi = lo + len(wanted)
-        if rows is not None:
+        if glance is not None and len(rows):
             n_whole = min(max(hi - start, 0) // rows.dtype.itemsize, len(rows))
             glance(rows[n_seen:n_whole])
             n_seen = n_whole

@@ -60,7 +60,14 @@ class PlyTable:
     @property
     def n_rows(self) -> int:
         """Number of rows N of the vertex element."""
-        return self.header.element("vertex").count
+        return self.header.vertex.count
+
+    @property
+    def rows(self) -> NDArray:
+        """The vertex element as a structured view."""
+        rows = self.element("vertex")
+        assert rows is not None
+        return rows
 
     def element(self, name: str) -> NDArray | None:
         """Return the rows of an element as a structured view, None if there is none of that name."""
@@ -88,7 +95,7 @@ class PlyTable:
         new_columns : list of NewColumn
             Columns to add.
         """
-        rows = self.element("vertex")
+        rows = self.rows
         start = self.offset_of(rows)
         yield self.body[:start]
         for lo in range(0, len(rows), _BLOCK_ROWS):
@@ -106,7 +113,8 @@ class PlyTable:
         """Bytes of the block with the new columns spliced into each row."""
         old = block.view(np.uint8).reshape(len(block), block.dtype.itemsize)
         pieces, start = [], 0
-        ends = {name: offset + dtype.itemsize for name, (dtype, offset) in block.dtype.fields.items()}
+        widths = [dtype.itemsize for dtype in field_types(block.dtype).values()]
+        ends = dict(zip(field_types(block.dtype), np.cumsum(widths).tolist(), strict=True))
         for column in sorted(new_columns, key=lambda c: ends[c.after]):
             pieces.append(old[:, start : ends[column.after]])
             values = column.values[lo:hi].astype(self.header.byte_order + "f4")
@@ -119,9 +127,14 @@ class PlyTable:
 def binary_table(name: str, header: PlyHeader, body: NDArray[np.uint8]) -> PlyTable:
     """Name the columns of binary rows of equal size; nothing is copied."""
     table = PlyTable(name, header, body)
-    rows = table.element("vertex")
-    table.columns.update({column: rows[column] for column in rows.dtype.names})
+    rows = table.rows
+    table.columns.update({column: rows[column] for column in field_types(rows.dtype)})
     return table
+
+
+def field_types(record: np.dtype) -> dict[str, np.dtype]:
+    """Columns of a packed record with their types, in order."""
+    return {name: record[name] for name in record.names or ()}
 
 
 def cast_values(values: NDArray, dtype: np.dtype) -> NDArray:

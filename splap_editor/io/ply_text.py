@@ -3,7 +3,7 @@
 import contextlib
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from io import BytesIO
 
 import numpy as np
@@ -26,7 +26,7 @@ class TextTable(PlyTable):
         Where in ``body`` the line of each row begins, and where the last one ends.
     """
 
-    line_starts: NDArray[np.intp] | None = None
+    line_starts: NDArray[np.intp] = field(default_factory=lambda: np.zeros(1, np.intp))
 
     def element(self, name: str) -> NDArray | None:
         """Return the vertex element as a structured array; text holds no views of the others."""
@@ -54,7 +54,7 @@ class TextTable(PlyTable):
 
     def _lines(self, lo: int, hi: int, changed: CellChanges, new_columns: list[NewColumn]) -> list[bytes]:
         """Lines of a block of rows, tokens replaced and added."""
-        vertex = self.header.element("vertex")
+        vertex = self.header.vertex
         replaced: dict[int, list[tuple[str, bytes]]] = {}
         for name, (rows, values) in changed.items():
             words = _words(cast_values(values, self.columns[name].dtype))
@@ -125,7 +125,7 @@ def text_table(name: str, header: PlyHeader, body: NDArray[np.uint8]) -> PlyTabl
         if element.name == "vertex":
             break
         first += element.count
-    vertex = header.element("vertex")
+    vertex = header.vertex
     starts = bounds[first : first + vertex.count + 1]
     parsed = _parsed_list_columns if vertex.has_lists else _parsed_columns
     columns = parsed(name, vertex, body, starts)
@@ -171,7 +171,7 @@ def _parsed_list_columns(
         try:
             place = _last_words(vertex, words)
             for column, values in columns.items():
-                values[row] = cast_values(np.float64(words[place[column]]), values.dtype)
+                values[row] = cast_values(np.array(float(words[place[column]])), values.dtype)
         except (ValueError, IndexError):
             raise _damage(name, row, "the promised numbers and lists") from None
     return columns

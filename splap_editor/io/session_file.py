@@ -202,7 +202,7 @@ def _handle(handle: JsonObject) -> HandleSettings:
 
 
 def _timeline(timeline: JsonObject) -> TimelineSpec:
-    keys = []
+    keys: list[KeySpec] = []
     for key in timeline.objects("keys", ("frame", "poses")):
         poses = {}
         for pose in key.objects("poses", ("id", "translate", "rotate", "scale")):
@@ -286,7 +286,7 @@ def _display(value: Any) -> dict[str, Scalar]:
 
 
 def _packed(mask: NDArray[np.bool_]) -> str:
-    return base64.b64encode(np.packbits(mask)).decode()
+    return base64.b64encode(np.packbits(mask).tobytes()).decode()
 
 
 def _mask(item: JsonObject, key: str, n_splats: int) -> NDArray[np.bool_]:

@@ -18,24 +18,23 @@ class SplatCells:
 
     Parameters
     ----------
-    columns : SplatColumns, optional
-        Where each part of a splat is; None if the table is packed and cannot
-        hold any difference.
+    columns : SplatColumns
+        Where each part of a splat is.
     layout : Layout
         What the columns mean.
     rest, splats : Splats
         What the table holds, and what it shall hold.
-    table : PlyTable, optional
+    table : PlyTable
         The table, for its normals and the lengths of its quaternions.
     """
 
     def __init__(
         self,
-        columns: SplatColumns | None,
+        columns: SplatColumns,
         layout: Layout,
         rest: Splats,
         splats: Splats,
-        table: PlyTable | None = None,
+        table: PlyTable,
     ) -> None:
         self._columns = columns
         self._layout = layout
@@ -43,16 +42,10 @@ class SplatCells:
         self._splats = splats
         self._table = table
 
-    def any_changed(self) -> bool:
-        """Whether any stored number of any splat differs."""
-        blocks = range(0, self._rest.n_splats, _BLOCK_ROWS)
-        parts = ("means", "log_scales", "quats", "logit_opacities", "sh0", "shN")
-        return any(_differs(*self._both(part, lo, lo + _BLOCK_ROWS)).any() for part in parts for lo in blocks)
-
     def changes(self, lo: int, hi: int) -> CellChanges:
         """Cells that differ in rows ``lo`` to ``hi - 1``; rows count from ``lo``."""
         found: CellChanges = {}
-        if self._columns is None or self._splats is self._rest:
+        if self._splats is self._rest:
             return found
         columns = self._columns
         self._plain(found, columns.means, *self._both("means", lo, hi))
@@ -71,7 +64,7 @@ class SplatCells:
 
     def _both(self, part: str, lo: int, hi: int) -> tuple[NDArray, NDArray]:
         """Rows of a part before and after."""
-        return getattr(self._rest, part)[lo:hi], np.asarray(getattr(self._splats, part))[lo:hi]
+        return _stored(self._rest, part, lo, hi), _stored(self._splats, part, lo, hi)
 
     @staticmethod
     def _plain(found: CellChanges, names: tuple[str, ...], before: NDArray, after: NDArray) -> None:
@@ -126,6 +119,22 @@ class SplatCells:
             finite = np.isfinite(turned).all(axis=1)
             for c, name in enumerate(self._columns.normals):
                 found[name] = rows[unit][finite], turned[finite, c]
+
+
+def any_stored_difference(rest: Splats, splats: Splats) -> bool:
+    """Whether any stored number of any splat differs."""
+    parts = ("means", "log_scales", "quats", "logit_opacities", "sh0", "shN")
+    blocks = [(lo, lo + _BLOCK_ROWS) for lo in range(0, rest.n_splats, _BLOCK_ROWS)]
+    return any(
+        _differs(_stored(rest, part, lo, hi), _stored(splats, part, lo, hi)).any()
+        for part in parts
+        for lo, hi in blocks
+    )
+
+
+def _stored(splats: Splats, part: str, lo: int, hi: int) -> NDArray:
+    """Some rows of a part."""
+    return np.asarray(getattr(splats, part))[lo:hi]
 
 
 def _differs(before: NDArray, after: NDArray) -> NDArray[np.bool_]:

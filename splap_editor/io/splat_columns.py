@@ -93,6 +93,7 @@ def plain_splats(
     warnings : list of str
         None of them.
     """
+    assert layout.columns is not None, "a packed layout is read otherwise"
     table = evidence.table
     columns, held = splat_columns(table, layout.columns), table.columns
     n_rest = len(columns.sh_rest)

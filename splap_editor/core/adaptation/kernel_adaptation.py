@@ -185,6 +185,7 @@ def adapt_kernels(
         if method == "surface":
             find_motions(binding.stencils, binding.inverse_moments, binding.dampings, *nodes, motions)
         else:
+            assert binding.graph is not None, "asked for at the door"
             find_ring_motions(hops, binding.graph.indptr, binding.graph.indices, *nodes, motions)
             # Each splat carries itself.
             carriers = np.repeat(np.arange(len(positions), dtype=np.int32)[:, None], 9, axis=1)

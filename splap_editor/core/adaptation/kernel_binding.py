@@ -138,7 +138,7 @@ class KernelBinding:
         self.spare_motions: list[NDArray[np.float64]] = []
         progress(1.0)
 
-    def _bind_inert(self, means: NDArray[np.float64]):
+    def _bind_inert(self, means: NDArray[np.float64]) -> None:
         """Find the nodes that carry the inert splats; without any, they stay."""
         k = min(INERT_CARRIERS, self.ellipses.n_nodes)
         self.inert_carriers = np.zeros((len(means), k), np.int32)

@@ -72,7 +72,7 @@ class LooseParts:
     def _sum(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Sum of per-anchor values over each part."""
         if values.ndim == 1:
-            return np.bincount(self._anchor_part, values, minlength=self._n_parts)
+            return np.asarray(np.bincount(self._anchor_part, values, minlength=self._n_parts), np.float64)
         return np.stack(
             [np.bincount(self._anchor_part, column, minlength=self._n_parts) for column in values.T], axis=1
         )

@@ -89,7 +89,7 @@ def blended_dual_quaternion(
     )
 
 
-def _rows(weights):
+def _rows(weights: sp.csr_array) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float64]]:
     indptr, indices = weights.indptr.astype(np.int32, copy=False), weights.indices.astype(np.int32, copy=False)
     return indptr, indices, weights.data.astype(np.float64, copy=False)
 

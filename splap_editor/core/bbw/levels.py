@@ -89,7 +89,9 @@ def coarser_level(finer: Level, kept: NDArray[np.bool_], *, spacing: float = 2.0
     links = sp.csr_array((flux, (I, J)), shape=(m, m))
     links = (links + links.T) / 2
     L = sp.csr_array(sp.diags_array(links.sum(axis=1)) - links)
-    return Level(finer.points[centers], L, np.bincount(cells, finer.M, m), finer.nodes[centers], cells)
+    return Level(
+        finer.points[centers], L, np.asarray(np.bincount(cells, finer.M, m), np.float64), finer.nodes[centers], cells
+    )
 
 
 def prolonged(values: NDArray[np.float64], coarser: Level, finer: Level, *, n_sweeps: int = 4) -> NDArray[np.float64]:

@@ -98,12 +98,12 @@ def touch_scales(ellipses: Ellipses, pairs: NDArray[np.integer], epsilon: float)
 
 
 def _checked_pairs(pairs: NDArray[np.integer], n_nodes: int) -> NDArray[np.int64]:
-    pairs = np.ascontiguousarray(pairs, np.int64)
-    if pairs.ndim != 2 or pairs.shape[1] != 2:
-        raise ValueError(f"pairs must have shape (E, 2), got {pairs.shape}")
-    if len(pairs) and not (pairs.min() >= 0 and pairs.max() < n_nodes):
-        raise ValueError(f"pairs must name nodes 0 to {n_nodes - 1}, got {pairs.min()} to {pairs.max()}")
-    return pairs
+    checked = np.ascontiguousarray(pairs, np.int64)
+    if checked.ndim != 2 or checked.shape[1] != 2:
+        raise ValueError(f"pairs must have shape (E, 2), got {checked.shape}")
+    if len(checked) and not (checked.min() >= 0 and checked.max() < n_nodes):
+        raise ValueError(f"pairs must name nodes 0 to {n_nodes - 1}, got {checked.min()} to {checked.max()}")
+    return checked
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")

@@ -59,7 +59,7 @@ class EllipseTree:
     boxes: NDArray[np.float64]
 
     @property
-    def arrays(self) -> tuple[NDArray, ...]:
+    def arrays(self) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
         """What the compiled searches take, in their order: nodes, discs, reaches, classes, boxes."""
         return self.nodes, self.discs, self.reaches, self.classes, self.boxes
 

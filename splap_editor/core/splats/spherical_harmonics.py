@@ -84,7 +84,8 @@ def sh_basis(directions: NDArray[np.floating], degree: int) -> NDArray[np.float6
     if not 0 <= degree <= MAX_SH_DEGREE:
         raise ValueError(f"spherical-harmonic degree must be 0 to {MAX_SH_DEGREE}, got {degree}")
     basis = np.empty(((degree + 1) ** 2 - 1, len(directions)))
-    _write_basis.py_func(*directions.T, degree, basis)
+    x, y, z = directions.T
+    _write_basis.py_func(x, y, z, degree, basis)
     return np.ascontiguousarray(basis.T)
 
 
@@ -197,8 +198,7 @@ def rotated_sh(
     degree = _degree(shN)
     if np.shape(rotations) != (len(shN), 3, 3):
         raise ValueError(f"rotations must have shape ({len(shN)}, 3, 3), got {np.shape(rotations)}")
-    dtype = np.float32 if shN.dtype.itemsize <= 4 else np.float64
-    turned = np.array(shN, dtype, order="C")
+    turned: NDArray[np.floating] = np.array(shN, np.float32 if shN.dtype.itemsize <= 4 else np.float64, order="C")
     if degree:
         if changed is None:
             changed = np.ones(len(shN), np.bool_)

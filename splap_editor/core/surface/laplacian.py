@@ -93,14 +93,13 @@ def star_weights(
     squares = [np.einsum("ij,ij->i", side, side) for side in sides]
     # Collinear corners have no area: the floor keeps their cotangents, of both signs, finite.
     doubled = 2.0 * np.maximum(areas, 1e-9 * np.maximum(np.maximum(squares[0], squares[1]), squares[2]))
-    upper = None
+    upper = sp.csr_array((n, n))
     for c in range(3):
         a, b = triangles[:, (c + 1) % 3], triangles[:, (c + 2) % 3]
         cotangents = -np.einsum("ij,ij->i", sides[(c + 1) % 3], sides[(c + 2) % 3]) / doubled
-        part = sp.coo_array((cotangents / 6.0, (np.minimum(a, b), np.maximum(a, b))), shape=(n, n)).tocsr()
-        upper = part if upper is None else upper + part
+        upper = upper + sp.coo_array((cotangents / 6.0, (np.minimum(a, b), np.maximum(a, b))), shape=(n, n)).tocsr()
     upper.data = np.maximum(upper.data, 0.0)
-    masses = sum(np.bincount(triangles[:, c], areas / 9.0, n) for c in range(3))
+    masses = np.sum([np.bincount(triangles[:, c], areas / 9.0, n) for c in range(3)], axis=0)
     return (upper + upper.T).tocsr(), masses
 
 
