@@ -5,12 +5,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.index_spaces import RowsByPlace
+from splap_editor.core.twofold_loop import TwofoldLoop
 
 _BINS = 1 << 16
 
 
 @nb.njit(nogil=True, cache=True)
-def _counting_sort(means, direction, order):
+def _counting_sort_compiled(means, direction, order):
     n = means.shape[0]
     keys = np.empty(n, np.float32)
     nearest, farthest = np.float32(np.inf), np.float32(-np.inf)
@@ -36,6 +37,22 @@ def _bin(behind, scale):
     place = behind * scale
     # A comparison with NaN is false: nothing but a number in range is ever converted.
     return np.int64(place) if 0.0 <= place <= _BINS - 1 else np.int64(_BINS - 1)
+
+
+def _counting_sort_plain(means, direction, order):
+    with np.errstate(invalid="ignore", over="ignore"):
+        behind = means @ direction
+        farthest, nearest = np.fmax.reduce(behind, initial=-np.inf), np.fmin.reduce(behind, initial=np.inf)
+        np.subtract(farthest, behind, out=behind)
+        behind *= np.float32(_BINS - 1) / max(farthest - nearest, np.float32(1e-30))
+    # Nothing but a number in range is converted.
+    np.nan_to_num(behind, copy=False, nan=_BINS - 1, posinf=_BINS - 1, neginf=_BINS - 1)
+    np.clip(behind, 0.0, _BINS - 1, out=behind)
+    # A stable sort of 16-bit keys is a radix sort.
+    order[:] = np.argsort(behind.astype(np.uint16), kind="stable")
+
+
+_counting_sort = TwofoldLoop(_counting_sort_compiled, _counting_sort_plain)
 
 
 def depth_order(means: NDArray[np.float32], direction: NDArray[np.floating]) -> RowsByPlace:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.index_spaces import FileRow
+from splap_editor.core.twofold_loop import TwofoldLoop
 from splap_editor.viewport.projection import Projection
 from splap_editor.viewport.splat_actor import DisplayMode, SplatActor, SplatFlag
 
@@ -33,11 +34,8 @@ class Hit:
 
 
 @nb.njit(nogil=True, cache=True)
-def _ray_hit(means, axes_u, axes_v, shape, colors, flags, scale, cut, start, direction, is_blended):
-    """Row and ray parameter of the first ellipse, or of the splat at which half of the light has been stopped."""
-    best, best_row = np.float32(np.inf), -1
-    hits = np.empty((64, 2), np.float32)
-    rows = np.empty(64, np.int64)
+def _hits_compiled(means, axes_u, axes_v, shape, colors, flags, scale, cut, start, direction, rows, hits):
+    """Write the rows that a ray meets, and where along the ray and how opaque; how many, even if fewer have room."""
     n_hits = 0
     sx, sy, sz = start
     dx, dy, dz = direction
@@ -59,7 +57,7 @@ def _ray_hit(means, axes_u, axes_v, shape, colors, flags, scale, cut, start, dir
         if gram == 0.0 or slope == 0.0:
             continue
         t = (cx * nx + cy * ny + cz * nz) / slope
-        if t <= 0.0 or (t >= best and not is_blended):
+        if t <= 0.0:
             continue
         hx, hy, hz = t * dx - cx, t * dy - cy, t * dz - cz
         # u and v need not be orthogonal once the splat is deformed: solve with their Gram matrix.
@@ -67,26 +65,62 @@ def _ray_hit(means, axes_u, axes_v, shape, colors, flags, scale, cut, start, dir
         a, b = (hu * vv - hv * uv) / gram, (hv * uu - hu * uv) / gram
         if a * a + b * b > square:
             continue
-        if not is_blended:
-            best, best_row = t, i
-            continue
-        if n_hits == len(rows):
-            hits = np.concatenate((hits, np.empty_like(hits)))
-            rows = np.concatenate((rows, np.empty_like(rows)))
-        hits[n_hits, 0] = t
-        hits[n_hits, 1] = colors[i, 3] / np.float32(255.0) * np.exp(-0.5 * (a * a + b * b) / (scale * scale))
-        rows[n_hits] = i
+        if n_hits < len(rows):
+            rows[n_hits], hits[n_hits, 0] = i, t
+            hits[n_hits, 1] = colors[i, 3] / np.float32(255.0) * np.exp(-0.5 * (a * a + b * b) / (scale * scale))
         n_hits += 1
-    if is_blended and n_hits > 0:
-        passed, strongest = 1.0, 0.0
-        for k in np.argsort(hits[:n_hits, 0]):
-            if hits[k, 1] * passed > strongest:
-                strongest = hits[k, 1] * passed
-                best, best_row = hits[k, 0], rows[k]
-            passed *= 1.0 - hits[k, 1]
-            if passed < 0.5:
-                return rows[k], hits[k, 0]
-    return best_row, best
+    return n_hits
+
+
+def _hits_plain(means, axes_u, axes_v, shape, colors, flags, scale, cut, start, direction, rows, hits):
+    d = np.array(direction, np.float32)
+    c, square = means - np.array(start, np.float32), (shape[:, 1] * scale) ** 2
+    spread = (axes_u * axes_u).sum(axis=1) + (axes_v * axes_v).sum(axis=1)
+    near = (c * c).sum(axis=1) - (c @ d) ** 2 <= square * spread
+    near &= (flags & _HIDDEN == 0) & (colors[:, 3] >= cut) & (square > 0.0)
+    i = np.flatnonzero(near)
+    c, u, v = c[i], axes_u[i], axes_v[i]
+    n = np.cross(u, v)
+    gram, slope = (n * n).sum(axis=1), n @ d
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = (c * n).sum(axis=1) / slope
+        h = t[:, None] * d - c
+        hu, hv, uv = ((p * q).sum(axis=1) for p, q in ((h, u), (h, v), (u, v)))
+        a = (hu * (v * v).sum(axis=1) - hv * uv) / gram
+        b = (hv * (u * u).sum(axis=1) - hu * uv) / gram
+        met = (t > 0.0) & (a * a + b * b <= square[i])
+    met[(gram == 0.0) | (slope == 0.0)] = False
+    found = np.flatnonzero(met)
+    kept = found[: len(rows)]
+    rows[: len(kept)], hits[: len(kept), 0] = i[kept], t[kept]
+    falloff = np.exp(-0.5 * (a[kept] ** 2 + b[kept] ** 2) / (scale * scale))
+    hits[: len(kept), 1] = colors[i[kept], 3] / np.float32(255.0) * falloff
+    return len(found)
+
+
+_hits = TwofoldLoop(_hits_compiled, _hits_plain)
+
+
+def _all_hits(*arguments):
+    """(K,) rows that a ray meets, (K,) where along it and (K,) how opaque, in file order."""
+    room = 1024
+    while True:
+        rows, hits = np.empty(room, np.int64), np.empty((room, 2), np.float32)
+        n = _hits(*arguments, rows, hits)
+        if n <= room:
+            return rows[:n], hits[:n, 0], hits[:n, 1]
+        room = n
+
+
+def _seen(at, opaque, is_blended):
+    """Which of some hits is seen: the nearest, or where half of the light has been stopped; there is at least one."""
+    if not is_blended:
+        return int(np.argmin(at))
+    order = np.argsort(at)
+    passed = np.cumprod(1.0 - opaque[order].astype(np.float64))
+    if passed[-1] < 0.5:
+        return int(order[np.argmax(passed < 0.5)])
+    return int(order[np.argmax(opaque[order] * np.concatenate([[1.0], passed[:-1]]))])
 
 
 def surface_hit(actor: SplatActor, projection: Projection, x: float, y: float) -> Hit | None:
@@ -108,7 +142,7 @@ def surface_hit(actor: SplatActor, projection: Projection, x: float, y: float) -
     """
     start, direction = projection.ray(x, y)
     is_blended = actor.look.mode is not DisplayMode.ELLIPSES
-    row, t = _ray_hit(
+    rows, at, opaque = _all_hits(
         actor.means,
         actor.axes_u,
         actor.axes_v,
@@ -119,10 +153,11 @@ def surface_hit(actor: SplatActor, projection: Projection, x: float, y: float) -
         actor.cut_byte,
         tuple(np.float32(start - actor.origin)),
         tuple(np.float32(direction)),
-        is_blended,
     )
-    if row < 0:
+    if not len(rows):
         return None
+    hit = _seen(at, opaque, is_blended)
+    row, t = int(rows[hit]), at[hit]
     normal = np.cross(actor.axes_u[row].astype(np.float64), actor.axes_v[row])
     normal *= -np.sign(normal @ direction) / np.linalg.norm(normal)
-    return Hit(int(row), start + float(t) * direction, normal)
+    return Hit(row, start + float(t) * direction, normal)

@@ -5,6 +5,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from splap_editor.core.index_spaces import FileMask
+from splap_editor.core.twofold_loop import TwofoldLoop
 from splap_editor.viewport.projection import Projection
 from splap_editor.viewport.splat_actor import DisplayMode, SplatActor, SplatFlag
 
@@ -13,10 +14,11 @@ _HIDDEN = int(SplatFlag.HIDDEN)
 _SOLID_RADIUS = 1.0
 _SOLID_OPACITY = 0.1
 _CELL_PX = 3
+_BATCH = 4096
 
 
 @nb.njit(nogil=True, cache=True)
-def _project(means, colors, flags, cut, clip, width, height, screen):
+def _project_compiled(means, colors, flags, cut, clip, width, height, screen):
     for i in range(means.shape[0]):
         x, y, z = means[i, 0], means[i, 1], means[i, 2]
         w = clip[3, 0] * x + clip[3, 1] * y + clip[3, 2] * z + clip[3, 3]
@@ -27,6 +29,18 @@ def _project(means, colors, flags, cut, clip, width, height, screen):
         screen[i, 0] = ((clip[0, 0] * x + clip[0, 1] * y + clip[0, 2] * z + clip[0, 3]) / w + 1.0) * 0.5 * width
         screen[i, 1] = (1.0 - (clip[1, 0] * x + clip[1, 1] * y + clip[1, 2] * z + clip[1, 3]) / w) * 0.5 * height
         screen[i, 2] = depth
+
+
+def _project_plain(means, colors, flags, cut, clip, width, height, screen):
+    x, y, depth, w = (means @ clip[:, :3].T + clip[:, 3]).T
+    seen = (flags & _HIDDEN == 0) & (colors[:, 3] >= cut) & (w > 0.0) & (depth > 0.0)
+    w = np.where(seen, w, np.float32(np.nan))
+    screen[:, 0] = (x / w + 1) * (np.float32(0.5) * width)
+    screen[:, 1] = (1 - y / w) * (np.float32(0.5) * height)
+    screen[:, 2] = np.where(seen, depth, np.float32(np.nan))
+
+
+_project = TwofoldLoop(_project_compiled, _project_plain)
 
 
 def _local_matrices(actor: SplatActor, projection: Projection) -> NDArray[np.float32]:
@@ -54,48 +68,34 @@ def screen_points(actor: SplatActor, projection: Projection) -> NDArray[np.float
     return screen
 
 
-@nb.njit(nogil=True, cache=True)
-def _in_box(screen, x0, y0, x1, y1, inside):
-    for i in range(screen.shape[0]):
-        inside[i] = x0 <= screen[i, 0] <= x1 and y0 <= screen[i, 1] <= y1
-
-
 def in_rectangle(screen: NDArray[np.float32], x0: float, y0: float, x1: float, y1: float) -> FileMask:
     """(N,) whether each of the `screen_points` lies in a rectangle given by two opposite corners."""
-    inside = np.empty(len(screen), bool)
     xs, ys = sorted((float(x0), float(x1))), sorted((float(y0), float(y1)))
-    _in_box(screen, xs[0], ys[0], xs[1], ys[1], inside)
+    x, y = screen[:, 0], screen[:, 1]
+    return (x >= xs[0]) & (x <= xs[1]) & (y >= ys[0]) & (y <= ys[1])
+
+
+def _polygon_mask(polygon, height, width):
+    """(height, width) bool: the pixels whose centres lie inside, even-odd."""
+    (ax, ay), (bx, by) = polygon.T, np.roll(polygon, -1, axis=0).T
+    # The rows whose centres an edge passes, from its lower end on and short of its upper end.
+    first, last = (
+        np.clip(np.ceil(end - 0.5), 0, height).astype(int) for end in (np.minimum(ay, by), np.maximum(ay, by))
+    )
+    edge = np.repeat(np.arange(len(polygon)), last - first)
+    row = np.arange(len(edge)) - np.repeat(np.cumsum(last - first) - (last - first), last - first) + first[edge]
+    x = ax[edge] + (row + 0.5 - ay[edge]) / (by[edge] - ay[edge]) * (bx[edge] - ax[edge])
+    # Each crossing turns inside and outside about, for all pixels to its right.
+    turns = np.zeros((height, width + 1), np.uint8)
+    np.bitwise_xor.at(turns, (row, np.clip(np.ceil(x - 0.5), 0, width).astype(int)), 1)
+    return np.bitwise_xor.accumulate(turns, axis=1)[:, :width].astype(bool)
+
+
+def _in_mask(screen, mask, left, top):
+    x, y = screen[:, 0] - left, screen[:, 1] - top
+    inside = (x >= 0.0) & (x < mask.shape[1]) & (y >= 0.0) & (y < mask.shape[0])
+    inside[inside] = mask[y[inside].astype(int), x[inside].astype(int)]
     return inside
-
-
-@nb.njit(nogil=True, cache=True)
-def _fill_polygon(polygon, mask):
-    """Even-odd scanlines through the centres of pixel rows."""
-    n = polygon.shape[0]
-    crossings = np.empty(n, np.float64)
-    for row in range(mask.shape[0]):
-        y = row + 0.5
-        count = 0
-        for i in range(n):
-            ax, ay = polygon[i]
-            bx, by = polygon[(i + 1) % n]
-            if (ay <= y) != (by <= y):
-                crossings[count] = ax + (y - ay) / (by - ay) * (bx - ax)
-                count += 1
-        ordered = np.sort(crossings[:count])
-        for k in range(0, count - 1, 2):
-            first = max(int(np.ceil(ordered[k] - 0.5)), 0)
-            last = min(int(np.ceil(ordered[k + 1] - 0.5)), mask.shape[1])
-            for column in range(first, last):
-                mask[row, column] = 1
-
-
-@nb.njit(nogil=True, cache=True)
-def _in_mask(screen, mask, left, top, inside):
-    height, width = mask.shape
-    for i in range(screen.shape[0]):
-        x, y = screen[i, 0] - left, screen[i, 1] - top
-        inside[i] = 0.0 <= x < width and 0.0 <= y < height and mask[int(y), int(x)] == 1
 
 
 def in_lasso(screen: NDArray[np.float32], polygon: ArrayLike) -> FileMask:
@@ -103,18 +103,27 @@ def in_lasso(screen: NDArray[np.float32], polygon: ArrayLike) -> FileMask:
     polygon = np.ascontiguousarray(polygon, np.float64)
     if polygon.ndim != 2 or polygon.shape[1] != 2:
         raise ValueError(f"polygon must have shape (K, 2), got {polygon.shape}")
-    inside = np.zeros(len(screen), bool)
-    if len(polygon) >= 3:
-        low = np.floor(polygon.min(axis=0))
-        width, height = (np.ceil(polygon.max(axis=0)) - low + 1).astype(int)
-        mask = np.zeros((height, width), np.uint8)
-        _fill_polygon(polygon - low, mask)
-        _in_mask(screen, mask, np.float32(low[0]), np.float32(low[1]), inside)
-    return inside
+    if len(polygon) < 3:
+        return np.zeros(len(screen), bool)
+    low = np.floor(polygon.min(axis=0))
+    width, height = (np.ceil(polygon.max(axis=0)) - low + 1).astype(int)
+    return _in_mask(screen, _polygon_mask(polygon - low, height, width), np.float32(low[0]), np.float32(low[1]))
+
+
+def _near_path_plain(screen, path, radius, inside):
+    inside[:] = False
+    margin = np.array([radius, radius])
+    for a, b in zip(path[np.maximum(np.arange(len(path)) - 1, 0)], path, strict=True):
+        low, high = np.minimum(a, b) - margin, np.maximum(a, b) + margin
+        near = ~inside & ((screen[:, :2] >= low) & (screen[:, :2] <= high)).all(axis=1)
+        from_a, along = screen[near, :2] - a, b - a
+        length = along @ along
+        t = np.clip(from_a @ along / length, 0.0, 1.0) if length > 0.0 else np.zeros(len(from_a))
+        inside[near] = ((from_a - t[:, None] * along) ** 2).sum(axis=1) <= radius * radius
 
 
 @nb.njit(nogil=True, cache=True)
-def _near_path(screen, path, radius, inside):
+def _near_path_compiled(screen, path, radius, inside):
     low_x, high_x = path[:, 0].min() - radius, path[:, 0].max() + radius
     low_y, high_y = path[:, 1].min() - radius, path[:, 1].max() + radius
     for i in range(screen.shape[0]):
@@ -133,6 +142,9 @@ def _near_path(screen, path, radius, inside):
                 break
 
 
+_near_path = TwofoldLoop(_near_path_compiled, _near_path_plain)
+
+
 def in_brush(screen: NDArray[np.float32], path: ArrayLike, radius_px: float) -> FileMask:
     """(N,) whether each of the `screen_points` lies within a radius of a stroke (K, 2) of pixels, K >= 1."""
     path = np.ascontiguousarray(np.atleast_2d(path), np.float64)
@@ -143,19 +155,49 @@ def in_brush(screen: NDArray[np.float32], path: ArrayLike, radius_px: float) -> 
     return inside
 
 
-@nb.njit(nogil=True, cache=True)
-def _box_of(screen, inside):
-    x0 = y0 = np.float32(np.inf)
-    x1 = y1 = np.float32(-np.inf)
-    for i in range(screen.shape[0]):
-        if inside[i]:
-            x0, x1 = min(x0, screen[i, 0]), max(x1, screen[i, 0])
-            y0, y1 = min(y0, screen[i, 1]), max(y1, screen[i, 1])
-    return x0, y0, x1, y1
+def _depth_grid_plain(
+    screen, axes_u, axes_v, shape, colors, clip, size, scale, solid_radius, solid_cut, left, top, grid
+):
+    reach = np.minimum(shape[:, 1] * scale, solid_radius)
+    rows = np.flatnonzero((screen[:, 2] > 0.0) & (reach > 0.0) & (colors[:, 3] >= solid_cut))
+    for start in range(0, len(rows), _BATCH):
+        _fill_cells(screen, axes_u, axes_v, reach, clip, size, left, top, grid, rows[start : start + _BATCH])
+
+
+def _fill_cells(screen, axes_u, axes_v, reach, clip, size, left, top, grid, rows):
+    (px, py, depth), reach = screen[rows].T, reach[rows]
+    half_x, half_y = np.float32(0.5) * size[0], np.float32(-0.5) * size[1]
+    is_perspective = clip[3, :3].any()
+    w = depth if is_perspective else np.float32(1.0)
+    (ux, uy, uz, uw), (vx, vy, vz, vw) = (clip[:, :3] @ axes[rows].T for axes in (axes_u, axes_v))
+    nx, ny = px / half_x - 1, py / half_y + 1
+    ax, ay = half_x / w * (ux - nx * uw), half_y / w * (uy - ny * uw)
+    bx, by = half_x / w * (vx - nx * vw), half_y / w * (vy - ny * vw)
+    det = ax * by - ay * bx
+    hx, hy = reach * np.sqrt(ax * ax + bx * bx), reach * np.sqrt(ay * ay + by * by)
+
+    def cells(low, high, n):
+        first = np.clip(np.trunc(low / _CELL_PX), 0, n).astype(int)
+        return first, np.clip(np.trunc(high / _CELL_PX) + 1, first, n).astype(int)
+
+    c0, c1 = cells(px - hx - left, px + hx - left, grid.shape[1])
+    r0, r1 = cells(py - hy - top, py + hy - top, grid.shape[0])
+    count = np.where(np.abs(det) < 1e-9, 0, (c1 - c0) * (r1 - r0))
+    i = np.repeat(np.arange(len(rows)), count)
+    k = np.arange(len(i)) - np.repeat(np.cumsum(count) - count, count)
+    r, c = r0[i] + k // (c1 - c0)[i], c0[i] + k % (c1 - c0)[i]
+    y, x = (r + 0.5) * _CELL_PX + top - py[i], (c + 0.5) * _CELL_PX + left - px[i]
+    inverse = 1 / det[i]
+    a, b = (by[i] * x - bx[i] * y) * inverse, (ax[i] * y - ay[i] * x) * inverse
+    z = depth[i] + a * uz[i] + b * vz[i]
+    covers = (a * a + b * b <= reach[i] ** 2) & (z > 0.0)
+    np.minimum.at(grid, (r[covers], c[covers]), z[covers].astype(np.float32))
 
 
 @nb.njit(nogil=True, cache=True)
-def _depth_grid(screen, axes_u, axes_v, shape, colors, clip, size, scale, solid_radius, solid_cut, left, top, grid):
+def _depth_grid_compiled(
+    screen, axes_u, axes_v, shape, colors, clip, size, scale, solid_radius, solid_cut, left, top, grid
+):
     """Nearest depth of each cell over the ellipses that cover its centre, each ellipse projected affinely."""
     rows, columns = grid.shape
     half_x, half_y = np.float32(0.5) * size[0], np.float32(-0.5) * size[1]
@@ -204,13 +246,16 @@ def _depth_grid(screen, axes_u, axes_v, shape, colors, clip, size, scale, solid_
                         grid[r, c] = z
 
 
-@nb.njit(nogil=True, cache=True)
+_depth_grid = TwofoldLoop(_depth_grid_compiled, _depth_grid_plain)
+
+
 def _keep_nearest(screen, grid, slack, left, top, inside):
-    for i in range(screen.shape[0]):
-        if inside[i]:
-            c, r = int((screen[i, 0] - left) / _CELL_PX), int((screen[i, 1] - top) / _CELL_PX)
-            if 0 <= r < grid.shape[0] and 0 <= c < grid.shape[1]:
-                inside[i] = screen[i, 2] <= grid[r, c] + slack
+    rows = np.flatnonzero(inside)
+    # Towards zero, as the grid was filled.
+    c, r = (((screen[rows, k] - start) / _CELL_PX).astype(int) for k, start in ((0, left), (1, top)))
+    in_grid = (r >= 0) & (r < grid.shape[0]) & (c >= 0) & (c < grid.shape[1])
+    rows, r, c = rows[in_grid], r[in_grid], c[in_grid]
+    inside[rows] = screen[rows, 2] <= grid[r, c] + slack
 
 
 def visible_only(
@@ -248,9 +293,9 @@ def visible_only(
     visible = inside.copy()
     if not inside.any():
         return visible
-    x0, y0, x1, y1 = _box_of(screen, inside)
-    low = np.maximum(np.floor([x0, y0]), 0.0)
-    high = np.minimum(np.ceil([x1, y1]) + 1.0, [projection.width, projection.height])
+    points = screen[inside, :2]
+    low = np.maximum(np.floor(points.min(axis=0)), 0.0)
+    high = np.minimum(np.ceil(points.max(axis=0)) + 1.0, [projection.width, projection.height])
     columns, rows = np.maximum((high - low) / _CELL_PX + 1, 1).astype(int)
     grid = np.full((rows, columns), np.inf, np.float32)
     is_ellipses = actor.look.mode is DisplayMode.ELLIPSES

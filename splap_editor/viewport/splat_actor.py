@@ -12,28 +12,43 @@ from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkDataObject, vtkPolyDa
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
 from splap_editor.core.index_spaces import RowsByPlace
+from splap_editor.core.twofold_loop import TwofoldLoop
 from splap_editor.resources import shader
 from splap_editor.viewport.glyphs import Glyphs
 
+_BLOCK = 64
+
+
+def _box(means: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Least and greatest of each column, (3,) each; ±inf without rows."""
+    # Rows of 64 points let the reduction run along memory, three times as fast as along columns of three.
+    n = len(means) - len(means) % _BLOCK
+    blocks = means[:n].reshape(-1, 3 * _BLOCK)
+    ends = []
+    for extreme, start in ((np.fmin, np.inf), (np.fmax, -np.inf)):
+        of_blocks = extreme.reduce(blocks, axis=0, initial=start).reshape(_BLOCK, 3)
+        ends.append(extreme.reduce(np.concatenate([of_blocks, means[n:]]), axis=0, initial=start))
+    return ends[0], ends[1]
+
 
 @nb.njit(nogil=True, cache=True)
-def _box(means):
-    low = np.full(3, np.inf, np.float32)
-    high = np.full(3, -np.inf, np.float32)
-    for i in range(means.shape[0]):
-        for k in range(3):
-            low[k] = min(low[k], means[i, k])
-            high[k] = max(high[k], means[i, k])
-    return low, high
-
-
-@nb.njit(nogil=True, cache=True)
-def _mix(colors, tints, mixed):
+def _mix_compiled(colors, tints, mixed):
+    """Lay each tint over its colour by the share in its fourth byte; opacities stay."""
     for i in range(colors.shape[0]):
         share = np.int32(tints[i, 3])
         for k in range(3):
             mixed[i, k] = (np.int32(colors[i, k]) * (255 - share) + np.int32(tints[i, k]) * share + 127) // 255
         mixed[i, 3] = colors[i, 3]
+
+
+def _mix_plain(colors, tints, mixed):
+    # Both products and the half that rounds stay below 2¹⁶.
+    share = tints[:, 3:].astype(np.uint16)
+    mixed[:, :3] = (colors[:, :3] * (255 - share) + tints[:, :3] * share + 127) // 255
+    mixed[:, 3] = colors[:, 3]
+
+
+_mix = TwofoldLoop(_mix_compiled, _mix_plain)
 
 
 Tint = tuple[float, float, float, float]

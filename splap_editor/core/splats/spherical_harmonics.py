@@ -4,6 +4,8 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.twofold_loop import TwofoldLoop
+
 SH_C0 = 0.28209479177387814
 MAX_SH_DEGREE = 4
 
@@ -266,7 +268,7 @@ def _rotate_sh(coefficients, rotations, changed, degree):
 
 
 @nb.njit(nogil=True, cache=True, fastmath={"contract", "reassoc", "arcp", "nsz"})
-def _view_colors(sh0, shN, positions, rotations, camera, degree, colors):
+def _view_colors_compiled(sh0, shN, positions, rotations, camera, degree, colors):
     basis = np.empty(24, np.float32)
     n_coefficients = shN.shape[1]
     for i in range(len(positions)):
@@ -293,3 +295,16 @@ def _view_colors(sh0, shN, positions, rotations, camera, degree, colors):
         colors[i, 0] = max(r, np.float32(0.0))
         colors[i, 1] = max(g, np.float32(0.0))
         colors[i, 2] = max(b, np.float32(0.0))
+
+
+def _view_colors_plain(sh0, shN, positions, rotations, camera, degree, colors):
+    seen = sh0.astype(np.float64) * SH_C0 + 0.5
+    if degree:
+        along = positions - camera
+        along /= np.sqrt(np.maximum((along * along).sum(axis=1, keepdims=True), 1e-30))
+        at_rest = np.einsum("nji,nj->ni", rotations, along)
+        seen += np.einsum("nk,nkc->nc", sh_basis(at_rest, degree), shN)
+    np.maximum(seen, 0.0, out=colors, casting="same_kind")
+
+
+_view_colors = TwofoldLoop(_view_colors_compiled, _view_colors_plain)
