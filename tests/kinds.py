@@ -23,6 +23,7 @@ _KIND_OF = {
     "engine": "pure",
     "session": "pure",
     "installation": "pure",
+    "installation/test_readiness.py": "window",
     "installation/test_system_packages.py": "window",
     "test_cli.py": "pure",
     "test_frames_cli.py": "offscreen",
