@@ -96,3 +96,10 @@ def test_nothing_but_the_agreed_names_lies_at_the_top():
     top = {line.split("/")[0] for line in listed.splitlines()}
     allowed = {"pyproject.toml", "splap_editor", "resources", "tests", "README.md", "LICENSE"}
     assert not {name for name in top - allowed if not name.startswith(".")}
+
+
+def test_a_commit_is_checked_as_the_test_run_checks():
+    run = (ROOT / "tests" / "run").read_text(encoding="utf-8")
+    hooks = (ROOT / ".pre-commit-config.yaml").read_text(encoding="utf-8")
+    checks = re.findall(r"^(.+) \|\| failed=1$", run.partition("failed=0\n")[2].partition("export")[0], re.MULTILINE)
+    assert checks == re.findall(r"^ +name: (.+)$", hooks, re.MULTILINE)

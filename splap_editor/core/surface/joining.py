@@ -51,8 +51,8 @@ def best_contacts(
     pairs = pairs[apart <= reach]
     pairs = pairs[contact_order(ellipses, pairs, epsilon)]
     # The best of each end comes first in the order.
-    best = [np.unique(pairs[:, side], return_index=True)[1] for side in (0, 1)]
-    chosen = np.intersect1d(*best)
+    best_of_first, best_of_second = (np.unique(pairs[:, side], return_index=True)[1] for side in (0, 1))
+    chosen = np.intersect1d(best_of_first, best_of_second)
     return pairs[np.union1d(chosen, [0]) if len(pairs) else chosen]
 
 

@@ -108,8 +108,9 @@ def seam_between(graph: SplatGraph, first: NDArray[np.integer], second: NDArray[
         # The seam that leaves no way at all is the widest: taken only if nothing narrower parts the two.
         if enough <= seams[-1].detour < np.inf:
             chosen = len(seams) - 1
-        is_looked_past = chosen is not None and (chosen < len(seams) - 1 or seams[chosen].detour >= APART)
-        if is_looked_past and len(seams) > chosen + wider:
+        if chosen is None or len(seams) <= chosen + wider:
+            continue
+        if chosen < len(seams) - 1 or seams[chosen].detour >= APART:
             break
     if not seams:
         return Seam(np.empty((0, 2), np.int32), 0.0, next_way)
