@@ -11,7 +11,6 @@ from time import sleep
 os.environ.setdefault("QT_API", "pyside6")
 
 from PySide6.QtCore import QCoreApplication, QObject, Qt, QTimer, Signal
-from PySide6.QtGui import QSurfaceFormat
 from PySide6.QtWidgets import QApplication
 
 from splap_editor.engine.cache import StageCache
@@ -21,20 +20,15 @@ from splap_editor.session.crash_report import CrashReport
 from splap_editor.session.documents import Documents
 from splap_editor.session.jobs import Job
 from splap_editor.session.session import Session
-from splap_editor.tools.axes_tool import AxesTool
-from splap_editor.tools.handle_tool import HandleTool
-from splap_editor.tools.inspect_tool import InspectTool
-from splap_editor.tools.navigate_tool import NavigateTool
-from splap_editor.tools.select_tool import SelectTool
-from splap_editor.tools.tool import ToolContext, ToolManager
-from splap_editor.tools.transform_tool import TransformTool
-from splap_editor.ui.actions.file_commands import sample_path
+from splap_editor.tools.tool import ToolContext
+from splap_editor.tools.tool_table import made_tools
+from splap_editor.ui.actions.file_actions import sample_path
 from splap_editor.ui.collector import MainThreadCollector
 from splap_editor.ui.display import Display
 from splap_editor.ui.end_signals import EndSignals
 from splap_editor.ui.main_window import MainWindow
 from splap_editor.ui.theme import apply_theme
-from splap_editor.ui.viewport_widget import ViewportWidget, surface_format
+from splap_editor.ui.viewport_widget import ViewportWidget, ask_of_qt
 from splap_editor.viewport.frame_pacer import FramePacer
 from splap_editor.viewport.inspect_view import InspectView
 from splap_editor.viewport.scene_view import SceneView
@@ -70,7 +64,7 @@ def run(path: Path | None = None) -> int:
     int
         Exit code.
     """
-    QSurfaceFormat.setDefaultFormat(surface_format())
+    ask_of_qt()
     _tell_taskbar()
     app = QApplication.instance() or QApplication([APP_ID])
     app.setDesktopFileName(APP_ID)
@@ -119,23 +113,11 @@ def make_window(cache: StageCache | None = None) -> MainWindow:
     view = SceneView(session, viewport)
     documents = Documents(session, mailbox.post)
     autosave = Autosave(documents, mailbox.post)
-    context = ToolContext(session, viewport)
-    context.navigate = NavigateTool(context)
-    axes = AxesTool(context)
-    tools = ToolManager(
-        context,
-        {
-            "handle": HandleTool(context, "handle"),
-            "pin": HandleTool(context, "pin"),
-            "select": SelectTool(context),
-            "inspect": InspectTool(context, InspectView(session, view)),
-        },
-        (axes, TransformTool(context)),
-        context.navigate,
-    )
+    context = ToolContext(session, viewport, InspectView(session, view))
+    tools = made_tools(context)
     widget.connect_tools(tools.pointer, tools.key)
     window = MainWindow(session, documents, autosave, widget, view, context, tools, Display())
-    axes.fly_to = window.view_commands.fly_to
+    context.fly_to = window.view_actions.fly_to
     cache.say = lambda text: mailbox.post(lambda: window.toast.say(text))
     mailbox.setParent(window)
     return window

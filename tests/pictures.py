@@ -16,14 +16,13 @@ sys.path.insert(0, str(REPOSITORY))
 
 import numpy as np
 from PySide6.QtCore import QCoreApplication, QEventLoop, QPoint, QPointF, QSettings, Qt, QTimer
-from PySide6.QtGui import QSurfaceFormat
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from splap_editor.app import make_window
 from splap_editor.resources import resource
 from splap_editor.ui.theme import apply_theme
-from splap_editor.ui.viewport_widget import surface_format
+from splap_editor.ui.viewport_widget import ask_of_qt
 
 PICTURES = REPOSITORY / "resources" / "pictures"
 SIZE = (1280, 800)
@@ -138,7 +137,7 @@ def weights_picture(person: Person) -> None:
 
 def main() -> None:
     """Make every picture."""
-    QSurfaceFormat.setDefaultFormat(surface_format())
+    ask_of_qt()
     app = QApplication(sys.argv[:1])
     QCoreApplication.setOrganizationName("splap-editor-pictures")
     QSettings.setDefaultFormat(QSettings.Format.IniFormat)

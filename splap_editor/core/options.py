@@ -78,7 +78,8 @@ class Option:
         Bounds of a number: greater than, at least, at most.
     choices : mapping of str to Choice, optional
     unit : str
-        ``"world"``: the file's units; ``"of s"``: units of the scene's size; empty for a bare number.
+        ``"world"``: the file's units; ``"of s"``: units of the scene's size; ``"px"``: pixels of the
+        screen; empty for a bare number.
     is_percent : bool
         A form shows a hundred times the value.
     step, decimals

@@ -1,12 +1,52 @@
 """Orbit, pan and zoom, as in Blender."""
 
-from splap_editor.tools.tool import KeyEvent, PointerEvent, ToolContext
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from splap_editor.tools.bindings import Binding
+from splap_editor.tools.tool import PointerEvent, Tool, ToolContext
+from splap_editor.viewport.camera import Camera
 
 ZOOM_PER_NOTCH = 1.15
 
+Motion = Callable[[Camera, float, float, NDArray[np.float64] | None], None]
 
-class NavigateTool:
-    """Middle button (or left on empty space) orbits, with shift pans, with ctrl zooms; the wheel zooms to the pointer.
+
+class CameraStroke:
+    """A drag that moves the camera, by a motion told in pixels; about the surface point under the press if any."""
+
+    def __init__(self, context: ToolContext, press: PointerEvent, motion: Motion) -> None:
+        self._viewport = context.viewport
+        self._motion = motion
+        self._last = press.xy
+        hit = self._viewport.pick(*press.xy)
+        self._pivot = None if hit is None else hit.point
+        self._viewport.begin_motion()
+
+    def move(self, event: PointerEvent) -> None:
+        """Move the camera on."""
+        dx, dy = event.xy[0] - self._last[0], event.xy[1] - self._last[1]
+        self._last = event.xy
+        self._motion(self._viewport.camera, dx, dy, self._pivot)
+        self._viewport.camera_moved()
+
+    def end(self, event: PointerEvent) -> None:
+        """Leave the camera where it is."""
+        self._viewport.end_motion()
+
+    def cancel(self) -> None:
+        """Leave the camera where it is."""
+        self._viewport.end_motion()
+
+
+def _zoom(camera: Camera, dx: float, dy: float, pivot: NDArray[np.float64] | None) -> None:
+    camera.zoom(ZOOM_PER_NOTCH ** (-dy / 30.0), pivot)
+
+
+class NavigateTool(Tool):
+    """Moves the camera; asked last, and for the middle button first.
 
     The gesture stays what it was when the button went down. Orbiting goes
     round the surface point under the pointer where there is one, so what the
@@ -14,62 +54,50 @@ class NavigateTool:
     """
 
     name = "navigate"
-    hint = "Drag to orbit, shift-drag to pan, wheel to zoom."
+    needs_scene = False
 
-    def __init__(self, context: ToolContext) -> None:
-        self._context = context
-        self._gesture = ""
-        self._last = (0.0, 0.0)
-        self._pivot = None
+    def orbit(self, press: PointerEvent) -> CameraStroke:
+        """Turn about what is under the pointer."""
+        return CameraStroke(self.context, press, Camera.orbit)
 
-    def pointer(self, event: PointerEvent) -> bool:
-        """Move the camera."""
-        if event.kind == "wheel":
-            self._wheel(event)
-            return True
-        if event.kind == "press" and event.button in ("middle", "left"):
-            self._gesture = "pan" if event.shift else "zoom" if event.ctrl else "orbit"
-            self._last = event.xy
-            hit = self._context.viewport.pick(*event.xy)
-            self._pivot = None if hit is None else hit.point
-            self._context.viewport.begin_motion()
-            return True
-        if event.kind == "move" and self._gesture:
-            self._drag(event)
-            return True
-        if event.kind == "release" and self._gesture:
-            self.cancel()
-            return True
-        return False
+    def pan(self, press: PointerEvent) -> CameraStroke:
+        """Shift, so that what is under the pointer follows it."""
+        return CameraStroke(self.context, press, Camera.pan)
 
-    def key(self, event: KeyEvent) -> bool:
-        """Take no key; views by key are actions of the window."""
-        return False
+    def zoom(self, press: PointerEvent) -> CameraStroke:
+        """Go nearer to what is under the pointer, or away from it."""
+        return CameraStroke(self.context, press, _zoom)
 
-    def cancel(self) -> None:
-        """Leave the camera where it is."""
-        if self._gesture:
-            self._gesture = ""
-            self._context.viewport.end_motion()
-
-    def _drag(self, event: PointerEvent) -> None:
-        camera = self._context.viewport.camera
-        dx, dy = event.xy[0] - self._last[0], event.xy[1] - self._last[1]
-        self._last = event.xy
-        if self._gesture == "orbit":
-            camera.orbit(dx, dy, self._pivot)
-        elif self._gesture == "pan":
-            camera.pan(dx, dy, self._pivot)
-        else:
-            camera.zoom(ZOOM_PER_NOTCH ** (-dy / 30.0), self._pivot)
-        self._context.viewport.camera_moved()
-
-    def _wheel(self, event: PointerEvent) -> None:
-        viewport = self._context.viewport
-        if event.pan_px != (0.0, 0.0) and not event.ctrl:
-            move = viewport.camera.pan if event.shift else viewport.camera.orbit
-            move(*event.pan_px)
-        else:
-            hit = viewport.pick(*event.xy)
-            viewport.camera.zoom_at(ZOOM_PER_NOTCH**event.steps, *event.xy, None if hit is None else hit.point)
+    def zoom_at(self, event: PointerEvent) -> None:
+        """Go nearer to the pointer by wheel or pinch."""
+        viewport = self.context.viewport
+        hit = viewport.pick(*event.xy)
+        viewport.camera.zoom_at(ZOOM_PER_NOTCH**event.steps, *event.xy, None if hit is None else hit.point)
         viewport.camera_moved()
+
+    def glide_orbit(self, event: PointerEvent) -> None:
+        """Turn as two fingers go."""
+        self.context.viewport.camera.orbit(*event.pan_px)
+        self.context.viewport.camera_moved()
+
+    def glide_pan(self, event: PointerEvent) -> None:
+        """Shift as two fingers go."""
+        self.context.viewport.camera.pan(*event.pan_px)
+        self.context.viewport.camera_moved()
+
+    bindings = (
+        Binding(("Middle drag",), orbit, "Orbit", "orbit", at_once=True),
+        Binding(
+            ("Drag",),
+            orbit,
+            "Orbit, in a tool that does not draw; by preference in all",
+            on="empty space",
+            at_once=True,
+        ),
+        Binding(("Shift+Middle drag", "Shift+Drag"), pan, "Pan", "pan", at_once=True),
+        Binding(("Ctrl+Middle drag", "Ctrl+Drag"), zoom, "Zoom", at_once=True),
+        Binding(("Shift+Two fingers",), glide_pan, "Pan"),
+        Binding(("Ctrl+Two fingers",), zoom_at),
+        Binding(("Any+Two fingers",), glide_orbit, "Orbit"),
+        Binding(("Any+Wheel", "Any+Pinch"), zoom_at, "Zoom to the pointer", "zoom"),
+    )

@@ -1,10 +1,10 @@
 """What lies under the cursor, for read-outs."""
 
 from splap_editor.session.signals import Signal
-from splap_editor.tools.tool import KeyEvent, PointerEvent, ToolContext
+from splap_editor.tools.tool import PointerEvent, Tool, ToolContext
 
 
-class ProbeTool:
+class ProbeTool(Tool):
     """Stands before the chosen tool, watches, and uses no event up.
 
     `changed` tells another `row` under the cursor. It looks only while
@@ -12,26 +12,23 @@ class ProbeTool:
     """
 
     name = "probe"
-    hint = ""
 
     def __init__(self, context: ToolContext) -> None:
-        self._context = context
+        super().__init__(context)
         self.changed = Signal()
         self.is_on = False
         self.row: int | None = None
 
-    def pointer(self, event: PointerEvent) -> bool:
+    def hover(self, event: PointerEvent) -> bool:
         """Look where the pointer goes, but not during a drag."""
-        if event.kind == "move" and not event.buttons and self.is_on and self._context.session.scene is not None:
-            hit = self._context.viewport.pick(*event.xy)
+        if self.is_on:
+            hit = self.context.viewport.pick(*event.xy)
             self._take(hit.row if hit is not None else None)
-        elif event.kind == "leave":
-            self._take(None)
         return False
 
-    def key(self, event: KeyEvent) -> bool:
-        """Take no key."""
-        return False
+    def left(self) -> None:
+        """Nothing is under the pointer."""
+        self._take(None)
 
     def cancel(self) -> None:
         """Forget what was under the cursor."""

@@ -1,14 +1,24 @@
-"""What a tool is, what it is told, and who is told first."""
+"""What a tool is, and what it is told."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import ClassVar, Generic, Protocol, TypeVar
+
+import numpy as np
 
 from splap_editor.session.session import Session
 from splap_editor.session.signals import Signal
+from splap_editor.tools.bindings import Binding, answering, gesture_name, held_modifiers, hint_of, key_names
+from splap_editor.viewport.camera import View
+from splap_editor.viewport.inspect_view import InspectView
 from splap_editor.viewport.viewport import Viewport
 
 CLICK_SLACK_PX = 5.0
 """A press that moves less before the release is a click."""
+
+Options = TypeVar("Options")
+
+_STEPS = {"press": "Press", "move": "Move", "release": "Release"}
 
 
 @dataclass(frozen=True)
@@ -18,7 +28,7 @@ class PointerEvent:
     Parameters
     ----------
     kind : str
-        ``"press"``, ``"move"``, ``"release"``, ``"wheel"``, ``"double"`` or ``"leave"``.
+        ``"press"``, ``"move"``, ``"release"``, ``"wheel"``, ``"pinch"``, ``"double"`` or ``"leave"``.
     xy : 2 floats
         Device pixels from the top left of the viewport.
     button : str
@@ -46,7 +56,7 @@ class PointerEvent:
 
 @dataclass(frozen=True)
 class KeyEvent:
-    """A key pressed while the pointer is over the viewport.
+    """A key pressed while the viewport has the keyboard.
 
     Parameters
     ----------
@@ -92,117 +102,218 @@ class Hud:
         self.show()
 
 
+class Held(Generic[Options]):
+    """Options of one kind, in force for every tool that has them; `changed` tells of other ones."""
+
+    def __init__(self, value: Options) -> None:
+        self.value = value
+        self.changed = Signal()
+
+    def set(self, value: Options) -> None:
+        """Put other options in force."""
+        if value != self.value:
+            self.value = value
+            self.changed.emit()
+
+
+class Stroke(Protocol):
+    """A drag under way, from the press to the release."""
+
+    def move(self, event: PointerEvent) -> None:
+        """Follow the pointer."""
+        ...
+
+    def end(self, event: PointerEvent) -> None:
+        """The button was let go: take it."""
+        ...
+
+    def cancel(self) -> None:
+        """Leave scene and edit as they were before it."""
+        ...
+
+
 @dataclass(eq=False)
 class ToolContext:
-    """What every tool works on; ``navigate`` takes over a drag that turns out to be one of the camera.
+    """What every tool works on.
 
-    With ``left_orbits`` a left drag without Shift or Ctrl is one, except where it draws.
+    Parameters
+    ----------
+    session : Session
+    viewport : Viewport
+    inspected : InspectView
+        The splat or edge looked at.
+    hud : Hud
+    orbit : callable
+        ``orbit(press)`` begins a stroke of the camera: what a drag becomes that no tool wants.
+    fly_to : callable
+        Brings the camera to a view; a host that can animate it says how.
+    left_orbits : bool
+        A left drag without Shift or Ctrl is one too, except where it draws.
     """
 
     session: Session
     viewport: Viewport
+    inspected: InspectView
     hud: Hud = field(default_factory=Hud)
-    navigate: "Tool | None" = None
+    orbit: Callable[[PointerEvent], Stroke | None] = lambda press: None
+    fly_to: Callable[[View], None] = field(init=False)
     left_orbits: bool = False
+    _held: dict[type, Held] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.fly_to = self._jump
+
+    def held(self, kind: type[Options]) -> Held[Options]:
+        """The options of a kind, shared by all tools that have them."""
+        return self._held.setdefault(kind, Held(kind()))
+
+    def _jump(self, view: View) -> None:
+        self.viewport.camera.view = view
+        self.viewport.camera_moved()
 
 
-class Tool(Protocol):
-    """Turns pointer and key events into previews and commands.
+class Tool:
+    """Turns pointer and key events into previews and undo steps, as its table of bindings says.
 
-    A method that returns True has used the event up. After a press that was used, the tool gets every event until
-    the button is released.
+    A press waits to be told a click from a drag, unless its binding is `at_once`; a drag that the table does not
+    hold turns the camera. `pointer` and `key` return True for an event they used up: after such a press the tool
+    gets every event until the button is released.
+
+    A tool states its name, its table, while something is under way the `active_bindings`, and the classes of its
+    options: option groups (`splap_editor.core.options`), shared through `ToolContext.held`.
     """
 
-    name: str
-    hint: str
+    name: ClassVar[str] = ""
+    bindings: ClassVar[tuple[Binding, ...]] = ()
+    active_bindings: ClassVar[tuple[Binding, ...]] = ()
+    option_kinds: ClassVar[tuple[type, ...]] = ()
+    needs_scene: ClassVar[bool] = True
+    yields_to_orbit: ClassVar[bool] = False
+
+    def __init__(self, context: ToolContext) -> None:
+        self.context = context
+        self._waiting: list[PointerEvent] = []
+        self._stroke: Stroke | None = None
+        self._button = ""
+
+    @property
+    def is_active(self) -> bool:
+        """Whether `active_bindings` hold."""
+        return False
+
+    @property
+    def hint(self) -> str:
+        """What to do, for the status line."""
+        return hint_of(self.active_bindings if self.is_active else self.bindings)
+
+    def hover(self, event: PointerEvent) -> bool:
+        """Take a move with no button held."""
+        return False
+
+    def left(self) -> None:
+        """Forget what was under the pointer: it is elsewhere."""
 
     def pointer(self, event: PointerEvent) -> bool:
         """Take a pointer event."""
-        ...
+        if event.kind == "leave":
+            self.left()
+            return False
+        if self.needs_scene and self.context.session.scene is None:
+            return False
+        if self.is_active:
+            return self._step(event)
+        if event.kind == "press":
+            return self._press(event)
+        if event.kind == "move":
+            if self._waiting or self._stroke is not None:
+                self._move(event)
+                return True
+            return not event.buttons and self.hover(event)
+        if event.kind == "release":
+            return self._release(event)
+        if event.kind == "wheel":
+            return self._perform(("Two fingers" if event.pan_px != (0.0, 0.0) else "Wheel",), event)
+        return event.kind == "pinch" and self._perform(("Pinch",), event)
 
     def key(self, event: KeyEvent) -> bool:
         """Take a key event."""
-        ...
+        return event.pressed and self._perform(key_names(event), event)
 
     def cancel(self) -> None:
         """Drop what is under way, leaving scene and edit as they were before it."""
-        ...
+        stroke, self._stroke = self._stroke, None
+        self._waiting = []
+        if stroke is not None:
+            stroke.cancel()
 
+    def stroke(self, press: PointerEvent) -> Stroke | None:
+        """Begin the drag that the table holds for a press."""
+        name, held = gesture_name(press.button, "Drag"), held_modifiers(press)
+        is_orbit = self.yields_to_orbit and self.context.left_orbits and not (press.shift or press.ctrl)
+        for binding in () if is_orbit else answering(self.bindings, name, held):
+            return binding.act(self, press)
+        return None
 
-class ToolManager:
-    """Passes events to whoever holds the pointer, else to the standing tools, the chosen tool and navigation.
-
-    Parameters
-    ----------
-    context : ToolContext
-    tools : dict
-        The tools that can be chosen, by name; the first is chosen at the start.
-    standing : sequence of Tool
-        Asked before the chosen tool, in order: the gizmo.
-    navigation : Tool
-        Asked last, and first for the middle button and the wheel.
-    """
-
-    def __init__(self, context: ToolContext, tools: dict[str, Tool], standing: tuple[Tool, ...], navigation: Tool):
-        self.context = context
-        context.navigate = navigation
-        self.tools = tools
-        self.chosen_changed = Signal()
-        self._standing = standing
-        self._navigation = navigation
-        self._chosen = next(iter(tools))
-        self._holder: Tool | None = None
-
-    @property
-    def chosen(self) -> Tool:
-        """The tool in use."""
-        return self.tools[self._chosen]
-
-    def choose(self, name: str) -> None:
-        """Change the tool in use; what is under way is cancelled."""
-        if name != self._chosen:
-            self.cancel()
-            self._chosen = name
-            self.chosen_changed.emit()
-
-    def stand(self, tool: Tool) -> None:
-        """Ask another tool before all others."""
-        self._standing = (tool, *self._standing)
-
-    def cancel(self) -> None:
-        """Cancel what is under way in every tool."""
-        self._holder = None
-        for tool in self._everyone():
-            tool.cancel()
-        self.context.hud.clear()
-
-    def pointer(self, event: PointerEvent) -> bool:
-        """Offer a pointer event; True when it was used."""
-        if self._holder is not None:
-            holder = self._holder
-            if event.kind == "release" and not event.buttons:
-                self._holder = None
-            holder.pointer(event)
-            return True
-        for tool in self._asked(event):
-            if tool.pointer(event):
-                if event.kind == "press":
-                    self._holder = tool
-                return True
+    def _perform(self, names: tuple[str, ...], event: PointerEvent | KeyEvent) -> bool:
+        table = self.active_bindings if self.is_active else self.bindings
+        held = held_modifiers(event)
+        for name in names:
+            for binding in answering(table, name, held):
+                if binding.act(self, event) is not False:
+                    return True
         return False
 
-    def key(self, event: KeyEvent) -> bool:
-        """Offer a key event; True when it was used. Escape cancels whatever is under way."""
-        used = any(tool.key(event) for tool in (*self._standing, self.chosen, self._navigation))
-        if not used and event.pressed and event.key == "Escape" and self._holder is not None:
-            self.cancel()
+    def _step(self, event: PointerEvent) -> bool:
+        if event.kind in _STEPS:
+            step = _STEPS[event.kind]
+            return self._perform((gesture_name(event.button, step) if event.button else step,), event)
+        return False
+
+    def _press(self, event: PointerEvent) -> bool:
+        if self._waiting or self._stroke is not None:
             return True
-        return used
+        held = held_modifiers(event)
+        names = [gesture_name(event.button, gesture) for gesture in ("Click", "Drag")]
+        waits = False
+        for binding in self.bindings:
+            if not any(binding.answers(name, held) for name in names):
+                continue
+            if not binding.at_once:
+                waits = True
+                continue
+            used = binding.act(self, event)
+            if used is not None and used is not False:
+                self._stroke, self._button = None if used is True else used, event.button
+                return True
+        if waits:
+            self._waiting, self._button = [event], event.button
+        return waits
 
-    def _asked(self, event: PointerEvent) -> tuple[Tool, ...]:
-        if event.button == "middle":
-            return (self._navigation,)
-        return (*self._standing, self.chosen, self._navigation)
+    def _move(self, event: PointerEvent) -> None:
+        if self._stroke is not None:
+            self._stroke.move(event)
+            return
+        self._waiting.append(event)
+        press = self._waiting[0]
+        if np.hypot(event.xy[0] - press.xy[0], event.xy[1] - press.xy[1]) > CLICK_SLACK_PX:
+            moves, self._waiting = self._waiting[1:], []
+            self.left()
+            self._stroke = self.stroke(press) or self.context.orbit(press)
+            # Where the pointer went before it was known to be a drag is part of it.
+            for move in moves if self._stroke is not None else ():
+                self._stroke.move(move)
 
-    def _everyone(self) -> tuple[Tool, ...]:
-        return (*self._standing, *self.tools.values(), self._navigation)
+    def _release(self, event: PointerEvent) -> bool:
+        if event.button != self._button:
+            return False
+        if self._stroke is not None:
+            stroke, self._stroke = self._stroke, None
+            stroke.end(event)
+            return True
+        if not self._waiting:
+            return False
+        press, self._waiting = self._waiting[0], []
+        for binding in answering(self.bindings, gesture_name(press.button, "Click"), held_modifiers(press)):
+            binding.act(self, press)
+            break
+        return True

@@ -1,10 +1,13 @@
 """Moving handles: the gizmo, and G / R / S with axis locks and typed numbers."""
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.engine.edit import Handle, Pose
-from splap_editor.tools.tool import KeyEvent, PointerEvent, ToolContext
+from splap_editor.tools.bindings import Binding
+from splap_editor.tools.tool import KeyEvent, PointerEvent, Tool, ToolContext
 from splap_editor.viewport.gizmo import DOT, SCALE_BOX, VIEW_RING, Act, Lock, Part
 
 MARKER_REACH_PX = 11.0
@@ -12,10 +15,9 @@ MARKER_REACH_PX = 11.0
 _KEY_PARTS = {"G": DOT, "R": VIEW_RING, "S": SCALE_BOX}
 _AXES = {"X": 0, "Y": 1, "Z": 2}
 _LABELS = {Act.TRANSLATE: "Move handle", Act.ROTATE: "Turn handle", Act.SCALE: "Scale handle"}
-_TYPED = set("0123456789.-")
 
 
-class TransformTool:
+class TransformTool(Tool):
     """Stands before the chosen tool: a press on the gizmo, on a handle's marker, or a transform under way by key.
 
     Poses are worked out from those at the start of the drag, never from the
@@ -26,19 +28,12 @@ class TransformTool:
     name = "transform"
 
     def __init__(self, context: ToolContext) -> None:
-        self._context = context
+        super().__init__(context)
         self._starts: dict[int, tuple[Handle, Pose]] = {}
         self._by_key = False
         self._typed = ""
-        self._pointer = (0.0, 0.0)
+        self._xy = (0.0, 0.0)
         self._has_moved = False
-
-    @property
-    def hint(self) -> str:
-        """What to do, for the status line."""
-        if self.is_active:
-            return "X Y Z lock an axis (Shift: a plane), type a number, Ctrl snaps, Shift is fine, Esc cancels."
-        return "Drag the gizmo, or G R S to move, turn, scale."
 
     @property
     def is_active(self) -> bool:
@@ -47,74 +42,92 @@ class TransformTool:
 
     def pointer(self, event: PointerEvent) -> bool:
         """Drag the gizmo, choose handles by their markers, finish what a key began."""
-        viewport = self._context.viewport
         if event.kind != "leave":
-            self._pointer = event.xy
-        if self.is_active:
-            return self._continue(event)
-        if self._context.session.scene is None:
-            return False
-        if event.kind == "press" and event.button == "left":
-            part = viewport.gizmo_part(*event.xy)
-            if part is not None:
-                self._begin(part, event.xy, by_key=False)
-                return True
-            return self._choose_marker(event)
-        if event.kind == "move" and not event.buttons:
-            viewport.hover_gizmo(*event.xy)
-            return viewport.gizmo.hovered is not None
-        return False
+            self._xy = event.xy
+        if not self.is_active:
+            return super().pointer(event)
+        super().pointer(event)
+        # The camera can be moved meanwhile.
+        return event.button != "middle" and event.kind not in ("wheel", "pinch", "leave")
+
+    def hover(self, event: PointerEvent) -> bool:
+        """Light up the part of the gizmo under the cursor."""
+        return self.context.viewport.hover_gizmo(event.xy) is not None
+
+    def left(self) -> None:
+        """Light up none."""
+        self.context.viewport.hover_gizmo(None)
 
     def key(self, event: KeyEvent) -> bool:
-        """Take G, R, S, the locks, digits, Return and Escape."""
-        if not event.pressed or event.ctrl or event.alt:
-            return False
-        if self.is_active:
-            return self._key_while_active(event)
-        if event.key in _KEY_PARTS and self._active_handles() and not event.shift:
-            self._begin(_KEY_PARTS[event.key], self._pointer, by_key=True)
-            return True
-        return False
+        """Take keys; while something is under way, all that could mean something else."""
+        if self.is_active and event.pressed:
+            self.context.session.catch_up()
+        used = super().key(event)
+        return used or (self.is_active and event.pressed and not (event.ctrl or event.alt))
 
     def cancel(self) -> None:
         """Bring the poses from before the drag back."""
+        super().cancel()
         if self.is_active:
-            self._context.viewport.gizmo.cancel()
+            self.context.viewport.gizmo.cancel()
             self._finish()
-            self._context.session.cancel_preview()
+            self.context.session.cancel_preview()
 
-    def _continue(self, event: PointerEvent) -> bool:
-        if event.kind == "move":
-            # While a pose is on its way only the newest pointer position matters.
-            self._context.session.drag(lambda: self._move(event))
-        elif event.kind == "press" and event.button == "right":
-            self.cancel()
-        elif (event.kind == "press" and self._by_key and event.button == "left") or (
-            event.kind == "release" and event.button == "left" and not self._by_key
-        ):
-            self._commit()
-        return event.button != "middle" and event.kind != "wheel"
+    # At rest ------------------------------------------------------------------------------------------------------
 
-    def _key_while_active(self, event: KeyEvent) -> bool:
-        gizmo = self._context.viewport.gizmo
-        self._context.session.catch_up()
-        if event.key == "Escape":
+    def grab(self, event: PointerEvent) -> bool:
+        """Begin to drag the part of the gizmo under the cursor."""
+        part = self.context.viewport.gizmo_part(*event.xy)
+        if part is not None:
+            self._begin(part, event.xy, by_key=False)
+        return part is not None
+
+    def start(self, event: KeyEvent) -> bool:
+        """Begin to move, turn or scale with the pointer; of what is under way by key, another of them."""
+        if self.is_active:
+            if not self._by_key:
+                return False
             self.cancel()
-        elif event.key in ("Return", "Enter"):
+        if self._active_handles():
+            self._begin(_KEY_PARTS[event.key], self._xy, by_key=True)
+        return self.is_active
+
+    # Under way ----------------------------------------------------------------------------------------------------
+
+    def follow(self, event: PointerEvent, *, fine: bool = False, snap: bool = False) -> None:
+        """Go with the pointer; while a pose is on its way only the newest position matters."""
+
+        def go() -> None:
+            if self.is_active:
+                self._show(self.context.viewport.gizmo.move(*event.xy, fine=fine, snap=snap))
+
+        self.context.session.drag(go)
+
+    def take(self, event: PointerEvent | KeyEvent) -> None:
+        """Make it a step: by Return, by the release of a drag, by the click after a key."""
+        kind = getattr(event, "kind", "")
+        if not kind or (kind == "press") == self._by_key:
             self._commit()
-        elif event.key in _AXES:
-            self._lock(Lock.PLANE if event.shift else Lock.AXIS, _AXES[event.key])
-        elif event.key in _KEY_PARTS and self._by_key:
-            start = self._pointer
-            self.cancel()
-            self._begin(_KEY_PARTS[event.key], start, by_key=True)
-        elif event.key == "Backspace" or (event.text in _TYPED and event.text):
-            self._typed = self._typed[:-1] if event.key == "Backspace" else self._typed + event.text
-            self._show(gizmo.type(_number(self._typed)))
-        return True
+
+    def drop(self, event: PointerEvent | KeyEvent) -> None:
+        """Bring the poses from before back."""
+        self.cancel()
+
+    def lock(self, event: KeyEvent) -> None:
+        """Bind to an axis, or let go of it."""
+        self._lock(Lock.AXIS, _AXES[event.key])
+
+    def lock_plane(self, event: KeyEvent) -> None:
+        """Bind to the plane across an axis, or let go of it."""
+        self._lock(Lock.PLANE, _AXES[event.key])
+
+    def enter(self, event: KeyEvent) -> None:
+        """Take one more character of a number, or one less."""
+        self._typed = self._typed[:-1] if event.key == "Backspace" else self._typed + event.text
+        self._show(self.context.viewport.gizmo.type(_number(self._typed)))
 
     def _lock(self, lock: Lock, axis: int) -> None:
-        gizmo = self._context.viewport.gizmo
+        gizmo = self.context.viewport.gizmo
         part = gizmo.dragged
         if part.act is Act.SCALE:
             return  # handles scale alike along all axes
@@ -125,17 +138,13 @@ class TransformTool:
         self._show(gizmo.bind(lock, axis))
 
     def _begin(self, part: Part, xy: tuple[float, float], *, by_key: bool) -> None:
-        viewport = self._context.viewport
+        viewport = self.context.viewport
         self._starts = {h.handle_id: (h, h.pose) for h in self._active_handles()}
         self._by_key = by_key
         self._typed = ""
         self._has_moved = False
         viewport.gizmo.begin(part, viewport.projection, *xy)
         viewport.begin_motion()
-
-    def _move(self, event: PointerEvent) -> None:
-        if self.is_active:
-            self._show(self._context.viewport.gizmo.move(*event.xy, fine=event.shift, snap=event.ctrl))
 
     def _show(self, delta: NDArray[np.float64]) -> None:
         """Preview every handle of the drag moved by one world transform about their common pivot."""
@@ -144,12 +153,12 @@ class TransformTool:
             handle_id: pose.moved(delta, np.asarray(handle.region.center, np.float64))
             for handle_id, (handle, pose) in self._starts.items()
         }
-        self._context.session.preview_poses(poses)
-        self._context.hud.show(text=self._read_out())
-        self._context.viewport.gizmo_changed()
+        self.context.session.preview_poses(poses)
+        self.context.hud.show(text=self._read_out())
+        self.context.viewport.gizmo_changed()
 
     def _read_out(self) -> str:
-        gizmo = self._context.viewport.gizmo
+        gizmo = self.context.viewport.gizmo
         part = gizmo.dragged
         bound = {Lock.AXIS: f" along {'XYZ'[part.axis]}", Lock.PLANE: f" across {'XYZ'[part.axis]}", Lock.VIEW: ""}
         typed = f"  [{self._typed}]" if self._typed else ""
@@ -161,8 +170,8 @@ class TransformTool:
         return f"Move{bound[part.lock]}: {gizmo.amount:.4g}{typed}"
 
     def _commit(self) -> None:
-        viewport = self._context.viewport
-        self._context.session.catch_up()
+        viewport = self.context.viewport
+        self.context.session.catch_up()
         label = _LABELS[viewport.gizmo.dragged.act]
         if len(self._starts) > 1:
             label += "s"
@@ -170,41 +179,75 @@ class TransformTool:
         viewport.gizmo.end()
         self._finish()
         if has_moved:
-            self._context.session.commit_preview(label)
+            self.context.session.commit_preview(label)
         viewport.gizmo_changed()
 
     def _finish(self) -> None:
         self._starts = {}
         self._typed = ""
-        self._context.hud.clear()
-        self._context.viewport.end_motion()
-        self._context.viewport.gizmo_changed()
+        self.context.hud.clear()
+        self.context.viewport.end_motion()
+        self.context.viewport.gizmo_changed()
 
-    def _choose_marker(self, event: PointerEvent) -> bool:
-        scene, viewport = self._context.session.scene, self._context.viewport
-        handles = scene.edit.active_handles
+    def choose(self, event: PointerEvent) -> bool:
+        """Choose the handle whose mark is under the cursor."""
+        handle_id = self._marked(event.xy)
+        if handle_id is not None:
+            self.context.session.scene.set_active_handles((handle_id,))
+        return handle_id is not None
+
+    def choose_more(self, event: PointerEvent) -> bool:
+        """Choose one more handle, or one less."""
+        handle_id, scene = self._marked(event.xy), self.context.session.scene
+        if handle_id is not None:
+            others = tuple(i for i in scene.active_handles if i != handle_id)
+            scene.set_active_handles(others if handle_id in scene.active_handles else (*others, handle_id))
+        return handle_id is not None
+
+    def _marked(self, xy: tuple[float, float]) -> int | None:
+        """Id of the handle whose mark is near a pixel."""
+        viewport, handles = self.context.viewport, self.context.session.scene.edit.active_handles
         if not handles:
-            return False
+            return None
         centers = np.array([np.asarray(h.region.center) + h.pose.translate for h in handles])
-        pixels = viewport.projection.pixels(centers)
-        distances = np.linalg.norm(pixels - np.array(event.xy), axis=1)
+        distances = np.linalg.norm(viewport.projection.pixels(centers) - np.array(xy), axis=1)
         nearest = int(np.argmin(distances))
-        if not distances[nearest] <= MARKER_REACH_PX * viewport.gizmo.scale:
-            return False
-        chosen = handles[nearest].handle_id
-        if event.shift:
-            kept = scene.active_handles
-            others = tuple(i for i in kept if i != chosen)
-            scene.set_active_handles(others if chosen in kept else (*kept, chosen))
-        else:
-            scene.set_active_handles((chosen,))
-        return True
+        is_near = distances[nearest] <= MARKER_REACH_PX * viewport.gizmo.scale
+        return handles[nearest].handle_id if is_near else None
 
     def _active_handles(self) -> list[Handle]:
-        scene = self._context.session.scene
+        scene = self.context.session.scene
         if scene is None:
             return []
         return [h for h in scene.edit.active_handles if h.handle_id in scene.active_handles]
+
+    bindings = (
+        Binding(
+            ("Any+Drag",),
+            grab,
+            "Arrow: along an axis; square: in a plane; dot: on the screen; ring: turn; box: scale",
+            "move, turn, scale",
+            on="the gizmo",
+            at_once=True,
+        ),
+        Binding(("Click", "Ctrl+Click", "Alt+Click"), choose, "Choose the handle", on="its mark", at_once=True),
+        Binding(("Shift+Click",), choose_more, "Choose one more, or one less", on="its mark", at_once=True),
+        Binding(("G", "R", "S"), start, "Move, turn, scale with the pointer", "by key"),
+    )
+    active_bindings = (
+        Binding(("Any+Press",), take, "… take it"),
+        Binding(("Any+Release",), take),
+        Binding(("Return", "Enter"), take, "… take it", "take it"),
+        Binding(("Esc", "Any+Right press"), drop, "… drop it", "drop it"),
+        Binding(("X", "Y", "Z"), lock, "… along an axis, or no more", "axis"),
+        Binding(("Shift+X", "Shift+Y", "Shift+Z"), lock_plane, "… across an axis, or no more", "plane"),
+        Binding(("Any+Number", "Backspace"), enter, "… by exactly so much", "exactly"),
+        Binding(("Ctrl+Move",), partial(follow, snap=True), "… in steps", "steps"),
+        Binding(("Shift+Move",), partial(follow, fine=True), "… finely", "finely"),
+        Binding(("Shift+Ctrl+Move",), partial(follow, fine=True, snap=True)),
+        Binding(("Any+Move",), follow),
+        Binding(("G", "R", "S"), start),
+    )
 
 
 def _number(text: str) -> float | None:

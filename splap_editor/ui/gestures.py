@@ -1,36 +1,16 @@
-"""What the mouse, the trackpad and single keys do: the second half of the help sheet."""
+"""What mouse, trackpad and keyboard do, in blocks: the help sheet and the README's table are made of them."""
 
-GESTURES: dict[str, tuple[tuple[str, str], ...]] = {
-    "Look around": (
-        ("Middle drag", "Orbit"),
-        ("Left drag on empty space", "Orbit; by preference anywhere"),
-        ("Shift + middle drag", "Pan"),
-        ("Ctrl + middle drag, wheel", "Zoom to the pointer"),
-        ("Two fingers", "Orbit; with Shift pan"),
-        ("Pinch", "Zoom"),
-    ),
-    "Handles": (
-        ("Click", "Place a handle, or choose one"),
-        ("Drag arrow, square, dot", "Move along an axis, in a plane, on the screen"),
-        ("Drag ring, box", "Turn, scale"),
-        ("G, R, S", "Move, turn, scale with the pointer"),
-        ("… then X, Y, Z", "Lock to an axis; with Shift to a plane"),
-        ("… then a number", "By exactly so much"),
-        ("Ctrl, Shift", "Snap, fine"),
-        ("Return or click, Esc", "Take it, drop it"),
-        ("Ctrl + wheel, [ ]", "Reach of the next handle"),
-    ),
-    "Select": (
-        ("Click, drag", "Splats under the pointer, in the frame, lasso or brush"),
-        ("Shift", "Add"),
-        ("Ctrl", "Remove"),
-        ("Shift + Ctrl", "Keep only what is in both"),
-        ("Wheel with the brush", "Size of the brush"),
-    ),
-    "Inspect": (
-        ("Click a splat, a line", "Its card and neighbours, its edge"),
-        ("X", "Cut the edge"),
-        ("Esc", "Let go of the edge, then of the splat"),
+from collections.abc import Iterable, Iterator
+
+from splap_editor.tools.bindings import Binding, capitalised
+from splap_editor.tools.tool_table import bindings_by_group
+from splap_editor.ui.actions.action_spec import ActionSpec
+
+Rows = tuple[tuple[str, str], ...]
+
+WIDGET_GESTURES: dict[str, Rows] = {
+    "Look around": (("Hold O", "Show the original"),),
+    "Quantities": (
         ("Drag over the histogram", "Select by value; Shift adds, Ctrl removes"),
         ("Drag the marks below it", "Ends of the colours; double click resets"),
     ),
@@ -39,6 +19,31 @@ GESTURES: dict[str, tuple[tuple[str, str], ...]] = {
         ("Drag a diamond, Esc", "Move a key, drop it where it was"),
         ("Right click on a diamond", "Delete the key"),
     ),
-    "Look": (("Hold O", "Show the original"),),
-    "Numbers": (("Drag a label sideways", "Change the number"),),
+    "Numbers": (
+        ("Drag a label sideways", "Change the number; Shift finely"),
+        ("Return, Esc", "Take it, leave it: the keys are the picture's again"),
+    ),
 }
+"""Gestures of single widgets, beside those of the tools."""
+
+
+def key_blocks(specs: Iterable[ActionSpec]) -> dict[str, Rows]:
+    """Keys and what they do, by title: tools, widgets, then the menus."""
+    blocks = {title: tuple(_rows(bindings)) for title, bindings in bindings_by_group().items()}
+    for title, rows in WIDGET_GESTURES.items():
+        blocks[title] = (*blocks.get(title, ()), *rows)
+    for spec in specs:
+        if spec.shortcuts:
+            title = f"{spec.menu.split('/')[0].replace('&', '')} menu"
+            blocks[title] = (*blocks.get(title, ()), (" or ".join(spec.shortcuts[:2]), spec.label))
+    return blocks
+
+
+def _rows(bindings: Iterable[Binding]) -> Iterator[tuple[str, str]]:
+    """Rows of a table; what does the same is told once."""
+    keys: dict[str, list[str]] = {}
+    for binding in bindings:
+        told = keys.setdefault(binding.sentence, [])
+        if binding.keys not in told:
+            told.append(binding.keys)
+    return ((capitalised(", ".join(told)), sentence) for sentence, told in keys.items())

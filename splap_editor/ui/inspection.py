@@ -10,9 +10,10 @@ from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.session.signals import Signal
 from splap_editor.tools.probe_tool import ProbeTool
-from splap_editor.tools.tool import ToolContext, ToolManager
+from splap_editor.tools.tool import ToolContext
+from splap_editor.tools.tool_manager import ToolManager
 from splap_editor.ui.actions.actions import ActionSet
-from splap_editor.ui.actions.graph_commands import CONDITIONS, GraphCommands
+from splap_editor.ui.actions.graph_actions import GraphActions
 from splap_editor.ui.panels.graph_panel import GraphPanel
 from splap_editor.ui.panels.inspect_panel import InspectPanel
 from splap_editor.ui.panels.quantity_panel import QuantityPanel
@@ -62,12 +63,12 @@ class Inspection:
         self._fly_to = fly_to
         tool = tools.tools["inspect"]
         self.quantities = QuantityView(session, view)
-        self.inspected: InspectView = tool.inspected
+        self.inspected: InspectView = context.inspected
         self.graph_view = GraphView(session, view)
         self.inspected.more_edges = lambda: self.graph_view.rows
         self.preview, self.edge_preview = GraphPreview(session), GraphPreview(session)
-        self.commands = GraphCommands(session, self.graph_view, self.inspected, say)
-        tool.cut_asked.connect(self.commands.cut_edge)
+        self.graph_actions = GraphActions(session, self.graph_view, self.inspected, say)
+        tool.cut_asked.connect(self.graph_actions.cut_edge)
         self.probe = ProbeTool(context)
         tools.stand(self.probe)
         self._make_widgets(session, viewport)
@@ -79,8 +80,8 @@ class Inspection:
         self.read_out = QLabel()
         self.quantity_panel = QuantityPanel(session, self.quantities)
         self.inspect_panel = InspectPanel(session, self.inspected, self.edge_preview)
-        self.inspect_panel.edge_toggled.connect(self.commands.toggle_edge)
-        self.graph_panel = GraphPanel(session, self.graph_view, self.preview, self.commands)
+        self.inspect_panel.edge_toggled.connect(self.graph_actions.toggle_edge)
+        self.graph_panel = GraphPanel(session, self.graph_view, self.preview, self.graph_actions)
         self.graph_panel.component_chosen.connect(self.look_at)
         self.panels: tuple[tuple[str, QWidget], ...] = (
             ("Quantities", self.quantity_panel),
@@ -94,7 +95,7 @@ class Inspection:
         SceneFollower(session, self.probe.cancel)
         self._tools.chosen_changed.connect(self._on_tool_chosen)
         self.inspected.changed.connect(self.changed.emit)
-        self.commands.kept_changed.connect(self.changed.emit)
+        self.graph_actions.kept_changed.connect(self.changed.emit)
 
     def set_actions(self, actions: ActionSet) -> None:
         """Give the panels the actions they have buttons for, and keep their marks right."""
@@ -105,10 +106,6 @@ class Inspection:
 
         self.graph_view.changed.connect(check)
         check()
-
-    def meets(self, condition: str) -> bool | None:
-        """Whether a condition of an action holds; None for one that is others' business."""
-        return self.commands.meets(condition) if condition in CONDITIONS else None
 
     def look_at(self, rows: np.ndarray) -> None:
         """Fly to some splats, and inspect the first of them."""

@@ -1,12 +1,11 @@
 """The window: viewport in the middle, tools at the left, panels at the right, one line of state below."""
 
-from PySide6.QtCore import QPoint, QSettings, QSize, Qt
-from PySide6.QtGui import QCloseEvent, QIcon
+from PySide6.QtCore import QEvent, QPoint, QSettings, QSize, Qt
+from PySide6.QtGui import QCloseEvent, QKeyEvent
 from PySide6.QtWidgets import (
     QDockWidget,
     QMainWindow,
     QMenu,
-    QMessageBox,
     QScrollArea,
     QSizePolicy,
     QToolBar,
@@ -14,26 +13,30 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-import splap_editor
 from splap_editor.session.autosave import Autosave
 from splap_editor.session.documents import Documents
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
-from splap_editor.tools.select_tool import SelectTool
-from splap_editor.tools.tool import ToolContext, ToolManager
+from splap_editor.tools.select_tool import SelectOptions
+from splap_editor.tools.tool import ToolContext
+from splap_editor.tools.tool_manager import ToolManager
+from splap_editor.tools.tool_table import TOOLS
+from splap_editor.ui.actions.action_table import ACTIONS
 from splap_editor.ui.actions.actions import ActionSet
-from splap_editor.ui.actions.commands import DisplayCommands, EditCommands, HandleCommands, SelectCommands, ToolCommands
-from splap_editor.ui.actions.conditions import scene_meets
-from splap_editor.ui.actions.document_commands import DocumentCommands
-from splap_editor.ui.actions.file_commands import FileCommands
+from splap_editor.ui.actions.conditions import State
+from splap_editor.ui.actions.display_actions import DisplayActions
+from splap_editor.ui.actions.document_actions import DocumentActions
+from splap_editor.ui.actions.edit_actions import EditActions
+from splap_editor.ui.actions.file_actions import FileActions
+from splap_editor.ui.actions.handle_actions import HandleActions
 from splap_editor.ui.actions.menus import fill_menu_bar
-from splap_editor.ui.actions.pose_commands import PoseCommands
-from splap_editor.ui.actions.program_commands import ProgramCommands
+from splap_editor.ui.actions.pose_actions import PoseActions
+from splap_editor.ui.actions.program_actions import ProgramActions
+from splap_editor.ui.actions.select_actions import SelectActions
 from splap_editor.ui.actions.selection_sets_menu import SelectionSetsMenu
-from splap_editor.ui.actions.timeline_commands import TimelineCommands
-from splap_editor.ui.actions.view_commands import ViewCommands
-from splap_editor.ui.dialogs.help_sheet import HelpSheet
-from splap_editor.ui.dialogs.picture_dialog import PictureDialog
+from splap_editor.ui.actions.timeline_actions import TimelineActions
+from splap_editor.ui.actions.tool_actions import ToolActions
+from splap_editor.ui.actions.view_actions import ViewActions
 from splap_editor.ui.display import Display
 from splap_editor.ui.file_drop import FileDrop
 from splap_editor.ui.inspection import Inspection
@@ -55,7 +58,6 @@ from splap_editor.ui.widgets.weight_legend import WeightLegend
 from splap_editor.viewport.scene_view import SceneView
 
 HINT = ("Click the surface to place a handle.", "Drag the arrows.")
-TOOL_COLUMN = ("tool.select", "tool.lasso", "tool.brush", "", "tool.handle", "tool.pin", "", "tool.inspect")
 CONTEXT_MENU = (
     "handle.from_selection",
     "handle.pin_selection",
@@ -74,7 +76,7 @@ LAYOUT_VERSION = 1
 
 
 class MainWindow(FileDrop, QMainWindow):
-    """Puts the parts together; what they do is in the commands, what is true in the session.
+    """Puts the parts together; what they do is in the actions, what is true in the session.
 
     Parameters
     ----------
@@ -119,7 +121,7 @@ class MainWindow(FileDrop, QMainWindow):
             tools,
             viewport,
             say=self.toast.say,
-            fly_to=lambda end: self.view_commands.fly_to(end),
+            fly_to=lambda end: self.view_actions.fly_to(end),
         )
         self.dock = QDockWidget()
         self.dock.setObjectName("panels")
@@ -128,7 +130,7 @@ class MainWindow(FileDrop, QMainWindow):
         self.inspection.set_actions(self.actions_)
         menus = fill_menu_bar(self.menuBar(), self.actions_)
         menus["&Select"].insertMenu(self.actions_["select.through"], self.selection_sets)
-        menus["&File"].insertMenu(self.actions_["file.open_sample"], self.document_commands.recent)
+        menus["&File"].insertMenu(self.actions_["file.open_sample"], self.document_actions.recent)
         self._add_tool_column()
         self._add_centre()
         self._add_panels()
@@ -140,6 +142,7 @@ class MainWindow(FileDrop, QMainWindow):
         self.statusBar().addPermanentWidget(self.state_line)
         # In a narrow window there is room for one of the two.
         self.job_bar.shown.connect(lambda on: self.state_line.hint.setVisible(not on))
+        viewport.setCursor(Qt.CursorShape.CrossCursor)
         viewport.resized.connect(self._on_viewport_resized)
         viewport.compare_held.connect(display.hold_original)
         viewport.menu_wanted.connect(self._on_menu_wanted)
@@ -169,39 +172,41 @@ class MainWindow(FileDrop, QMainWindow):
         self._show_display()
         self._restore()
         self._refresh()
+        viewport.setFocus()
 
     # ---------------------------------------------------------------- parts
 
     def _actions(self) -> ActionSet:
         session, view, tools = self.session, self.view, self.tools
-        select_tool = next(tool for tool in tools.tools.values() if isinstance(tool, SelectTool))
-        saving = DocumentCommands(self, session, self.documents, self.autosave, view.viewport, self.display, self.toast)
-        self.document_commands = saving
-        self.files = FileCommands(self, session, self.documents, self.toast, saving.save_then)
+        through = tools.context.held(SelectOptions)
+        through.changed.connect(lambda: self.actions_.check("select.through", through.value.through))
+        saving = DocumentActions(self, session, self.documents, self.autosave, view.viewport, self.display, self.toast)
+        self.document_actions = saving
+        self.files = FileActions(self, session, self.documents, view.viewport, self.toast, saving.save_then)
         self.selection_sets = SelectionSetsMenu(session, self)
-        self.timeline_commands = TimelineCommands(self, session, view.viewport, self.toast)
+        self.timeline_actions = TimelineActions(self, session, view.viewport, self.toast)
         self.recovery_bar = RecoveryBar(self.autosave, self.files.leave_edit)
-        self.view_commands = ViewCommands(session, view, self, self.dock)
-        self.program = ProgramCommands(self, PreferenceStore(session, view, tools.context))
+        self.view_actions = ViewActions(session, view, self, self.dock)
+        self.program = ProgramActions(self, PreferenceStore(session, view, tools.context))
         return ActionSet(
             self,
-            {
-                "program": self.program,
-                "file": self.files,
-                "document": saving,
-                "timeline": self.timeline_commands,
-                "pose": PoseCommands(session, self.toast),
-                "sets": self.selection_sets,
-                "edit": EditCommands(session, tools),
-                "select": SelectCommands(session, select_tool),
-                "handle": HandleCommands(session, view.viewport),
-                "display": DisplayCommands(self.display),
-                "graph": self.inspection.commands,
-                "view": self.view_commands,
-                "tool": ToolCommands(tools, select_tool),
-                "help": self,
-            },
-            self._is_met,
+            ACTIONS,
+            (
+                self.program,
+                self.files,
+                saving,
+                self.timeline_actions,
+                PoseActions(session, self.toast),
+                self.selection_sets,
+                EditActions(session, tools),
+                SelectActions(session, through),
+                HandleActions(session, view.viewport),
+                DisplayActions(self.display),
+                self.inspection.graph_actions,
+                self.view_actions,
+                ToolActions(tools),
+            ),
+            State(session, self.inspection.graph_actions),
         )
 
     def _add_tool_column(self) -> None:
@@ -210,11 +215,10 @@ class MainWindow(FileDrop, QMainWindow):
         column.setMovable(False)
         column.setIconSize(QSize(22, 22))
         column.toggleViewAction().setVisible(False)
-        for action_id in TOOL_COLUMN:
-            if action_id:
-                column.addAction(self.actions_[action_id])
-            else:
+        for k, entry in enumerate(TOOLS):
+            if k and TOOLS[k - 1].group != entry.group:
                 column.addSeparator()
+            column.addAction(self.actions_[f"tool.{entry.name}"])
         space = QWidget()
         space.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Expanding)
         column.addWidget(space)
@@ -230,8 +234,8 @@ class MainWindow(FileDrop, QMainWindow):
         layout.addWidget(ToolOptionsBar(self.tools, self.actions_))
         layout.addWidget(self.recovery_bar)
         layout.addWidget(self.viewport, 1)
-        layout.addWidget(TimelineStrip(self.session, self.timeline_commands, self.actions_))
-        self.timeline_commands.shown_changed.connect(lambda on: self.actions_.check("timeline.show", on))
+        layout.addWidget(TimelineStrip(self.session, self.timeline_actions, self.actions_))
+        self.timeline_actions.shown_changed.connect(lambda on: self.actions_.check("timeline.show", on))
         self.setCentralWidget(centre)
 
     def _add_panels(self) -> None:
@@ -266,19 +270,6 @@ class MainWindow(FileDrop, QMainWindow):
 
     # ---------------------------------------------------------------- state
 
-    def _is_met(self, condition: str) -> bool:
-        session, scene = self.session, self.session.scene
-        if condition in ("undo", "redo"):
-            return getattr(session.history, f"can_{condition}")
-        if condition == "busy":
-            return session.worker.is_busy("open", "prepare", "bind", "pose", "export", "frames")
-        is_met = self.inspection.meets(condition)
-        if is_met is not None:
-            return is_met
-        if condition == "halted":
-            return session.state in ("halted", "failed")
-        return scene is not None and scene_meets(scene, condition)
-
     def _refresh(self) -> None:
         history = self.session.history
         for name in ("undo", "redo"):
@@ -291,12 +282,7 @@ class MainWindow(FileDrop, QMainWindow):
         self.setWindowModified(self.documents.would_lose)
 
     def _show_tool(self) -> None:
-        chosen = self.tools.chosen
-        name = chosen.name
-        if isinstance(chosen, SelectTool):
-            name = {"lasso": "lasso", "brush": "brush"}.get(chosen.options.shape, "select")
-        self.actions_.check(f"tool.{name}")
-        self.viewport.setCursor(Qt.CursorShape.CrossCursor if name != "navigate" else Qt.CursorShape.ArrowCursor)
+        self.actions_.check(f"tool.{self.tools.chosen.name}")
 
     def _show_display(self) -> None:
         options = self.display.options
@@ -339,28 +325,26 @@ class MainWindow(FileDrop, QMainWindow):
                 menu.addAction(self.actions_[action_id])
         menu.popup(position)
 
-    # ---------------------------------------------------------------- help and pictures
+    # ---------------------------------------------------------------- keyboard
 
-    def sheet(self) -> None:
-        """Show every key and gesture."""
-        HelpSheet(self).open()
+    def event(self, event: QEvent) -> bool:
+        """Let tools have a key that no text field wants, wherever the focus is."""
+        is_key = event.type() == QEvent.Type.ShortcutOverride and not self.viewport.hasFocus()
+        if is_key and self.viewport.take_before_shortcuts(event):
+            return True
+        return super().event(event)
 
-    def about(self) -> None:
-        """Say what this is."""
-        box = QMessageBox(
-            QMessageBox.Icon.NoIcon, "About SpLap Editor", f"SpLap Editor {splap_editor.__version__}", parent=self
-        )
-        box.setInformativeText(
-            "Bends, poses and reshapes captured Gaussian splats with surface-aware Laplacians, "
-            "after “SpLap” (3DV 2026).\n\nFree software: GNU GPL 3 or later."
-        )
-        box.setIconPixmap(QIcon(self.windowIcon()).pixmap(64, 64))
-        box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        box.open()
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Take a key that the focused widget did not want; Return and Escape bring the keyboard back to the picture."""
+        if not self.viewport.hasFocus():
+            self.viewport.keyPressEvent(event)
+            if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Escape):
+                self.viewport.setFocus()
 
-    def show_picture_dialog(self) -> None:
-        """Ask for a size and write the view as a PNG."""
-        PictureDialog(self, self.view.viewport, self.session.scene.file.path, self.toast).open()
+    def keyReleaseEvent(self, event: QKeyEvent) -> None:
+        """Let go of a key that the viewport holds."""
+        if not self.viewport.hasFocus():
+            self.viewport.keyReleaseEvent(event)
 
     # ---------------------------------------------------------------- leaving
 
@@ -375,7 +359,7 @@ class MainWindow(FileDrop, QMainWindow):
         settings.setValue("window/layout", self.saveState(LAYOUT_VERSION))
         settings.setValue("hint/done", self._has_hinted)
         self.display.save()
-        self.timeline_commands.player.stop()
+        self.timeline_actions.player.stop()
         self.tools.cancel()
         self.recovery_bar.release()
         self.autosave.close(keep=self._keeps_edit)

@@ -8,7 +8,7 @@ from time import perf_counter
 
 os.environ.setdefault("QT_API", "pyside6")
 
-from PySide6.QtCore import QEvent, Qt, Signal
+from PySide6.QtCore import QCoreApplication, QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent, QMouseEvent, QNativeGestureEvent, QSurfaceFormat, QWheelEvent
 from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QLineEdit, QWidget
 from pyvistaqt import QtInteractor
@@ -52,6 +52,7 @@ class ViewportWidget(QtInteractor):
         self._pointer_taker: PointerTaker = lambda event: False
         self._key_taker: KeyTaker = lambda event: False
         self._taken_key: int | None = None
+        self._hover: PointerEvent | None = None
         self._is_compare_held = False
         self.n_renders = 0
         interactor = self.iren.interactor
@@ -121,8 +122,18 @@ class ViewportWidget(QtInteractor):
             self.mousePressEvent(event)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        """Pass a move."""
-        self._pass("move", event)
+        """Pass a move: all of a drag, of the others the last before something else happens."""
+        if event.buttons():
+            self._pass("move", event)
+            return
+        if self._hover is None:
+            QTimer.singleShot(0, self, self._pass_hover)
+        self._hover = self._pointer_event("move", event)
+
+    def _pass_hover(self) -> None:
+        hover, self._hover = self._hover, None
+        if hover is not None:
+            self._tell(self._pointer_taker, hover)
 
     def enterEvent(self, event: QEvent) -> None:
         """Take the keyboard, unless something is being typed."""
@@ -131,6 +142,7 @@ class ViewportWidget(QtInteractor):
 
     def leaveEvent(self, event: QEvent) -> None:
         """Tell that the pointer is gone."""
+        self._hover = None
         self._tell(self._pointer_taker, PointerEvent("leave", (-1.0, -1.0)))
 
     def wheelEvent(self, event: QWheelEvent) -> None:
@@ -148,38 +160,45 @@ class ViewportWidget(QtInteractor):
         """Let tools have a key before the shortcuts do, and a pinch before Qt does."""
         kind = event.type()
         if kind == QEvent.Type.ShortcutOverride:
-            if self._offer_key(event, pressed=True):
-                self._taken_key = event.key()
-                event.accept()
+            if self.take_before_shortcuts(event):
                 return True
         elif kind == QEvent.Type.NativeGesture:
             return self._on_native_gesture(event)
         return super().event(event)
 
+    def take_before_shortcuts(self, event: QKeyEvent) -> bool:
+        """Let tools have a key before the shortcuts do; True, and the event accepted, if they want it."""
+        if not self._offer_key(event, pressed=True):
+            return False
+        self._taken_key = event.key()
+        event.accept()
+        return True
+
     def _on_native_gesture(self, event: QNativeGestureEvent) -> bool:
         if event.gestureType() != Qt.NativeGestureType.ZoomNativeGesture:
             return False
         steps = log(max(1.0 + event.value(), 0.05)) / PINCH_NOTCH
-        return self._pass("wheel", event, steps=steps)
+        return self._pass("pinch", event, steps=steps)
 
     def _pass(self, kind: str, event: QMouseEvent, **more: object) -> bool:
+        self._pass_hover()
+        return self._tell(self._pointer_taker, self._pointer_event(kind, event, **more))
+
+    def _pointer_event(self, kind: str, event: QMouseEvent, **more: object) -> PointerEvent:
         ratio = self.devicePixelRatioF()
         held = event.modifiers()
         position = event.position()
         buttons = event.buttons() if hasattr(event, "buttons") else Qt.MouseButton.NoButton
         button = BUTTONS.get(event.button(), "") if kind in ("press", "release", "double") else ""
-        return self._tell(
-            self._pointer_taker,
-            PointerEvent(
-                kind,
-                (position.x() * ratio, position.y() * ratio),
-                button,
-                frozenset(name for flag, name in BUTTONS.items() if buttons & flag),
-                shift=bool(held & Qt.KeyboardModifier.ShiftModifier),
-                ctrl=bool(held & Qt.KeyboardModifier.ControlModifier),
-                alt=bool(held & Qt.KeyboardModifier.AltModifier),
-                **more,
-            ),
+        return PointerEvent(
+            kind,
+            (position.x() * ratio, position.y() * ratio),
+            button,
+            frozenset(name for flag, name in BUTTONS.items() if buttons & flag),
+            shift=bool(held & Qt.KeyboardModifier.ShiftModifier),
+            ctrl=bool(held & Qt.KeyboardModifier.ControlModifier),
+            alt=bool(held & Qt.KeyboardModifier.AltModifier),
+            **more,
         )
 
     @staticmethod
@@ -224,6 +243,7 @@ class ViewportWidget(QtInteractor):
             self.compare_held.emit(is_held)
 
     def _offer_key(self, event: QKeyEvent, *, pressed: bool) -> bool:
+        self._pass_hover()
         held = event.modifiers()
         return self._tell(
             self._key_taker,
@@ -238,8 +258,15 @@ class ViewportWidget(QtInteractor):
         )
 
 
+def ask_of_qt() -> None:
+    """Say what the window needs of OpenGL and of the mouse; to be called before the application is made."""
+    QSurfaceFormat.setDefaultFormat(surface_format())
+    # Of the positions that come in during a slow frame Qt would pass on the last only: a lasso would lose its corners.
+    QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_CompressHighFrequencyEvents, False)
+
+
 def surface_format() -> QSurfaceFormat:
-    """What the window asks of OpenGL; to be set before the application is made."""
+    """What the window asks of OpenGL."""
     wanted = QSurfaceFormat()
     wanted.setRenderableType(QSurfaceFormat.RenderableType.OpenGL)
     wanted.setProfile(QSurfaceFormat.OpenGLContextProfile.CoreProfile)

@@ -52,6 +52,12 @@ class View:
         """World height of the upper half of the picture at the focal point."""
         return self.distance * np.tan(np.radians(self.angle) / 2.0)
 
+    def is_near(self, other: "View") -> bool:
+        """Whether two views stand and look the same, but for rounding."""
+        near = 1e-6 * other.distance
+        mine, others = (np.concatenate([view.position, view.focal_point]) for view in (self, other))
+        return bool(np.abs(mine - others).max() <= near)
+
 
 def turn(axis: ArrayLike, angle_rad: float) -> NDArray[np.float64]:
     """(3, 3) rotation about an axis of any length, right-handed (Rodrigues)."""
@@ -163,6 +169,18 @@ def axis_view(view: View, axis: ArrayLike, world_up: ArrayLike) -> View:
         candidates = candidates[np.abs(candidates @ axis) < 0.5]
         up = candidates[np.argmax(candidates @ (view.view_up + 0.5 * view.direction * -np.sign(axis @ up)))]
     return replace(view, position=view.focal_point + axis * view.distance, view_up=up)
+
+
+def scene_axes(world_up: ArrayLike) -> NDArray[np.float64]:
+    """(3, 3) rows right, away from the viewer in front, and up, of a scene that stands along ``world_up`` (3,).
+
+    Right is X, or Y in a scene that stands along X.
+    """
+    up = np.asarray(world_up, np.float64) / np.linalg.norm(world_up)
+    side = np.eye(3)[0 if abs(up[0]) < 0.9 else 1]
+    right = side - (side @ up) * up
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(up, right), up])
 
 
 def blended(start: View, end: View, share: float) -> View:

@@ -211,9 +211,9 @@ class Viewport:
         """Part of the gizmo under the cursor."""
         return self.gizmo.hit(self.projection, x, y)
 
-    def hover_gizmo(self, x: float, y: float) -> Part | None:
-        """Light up the part of the gizmo under the cursor."""
-        part = self.gizmo_part(x, y)
+    def hover_gizmo(self, xy: tuple[float, float] | None) -> Part | None:
+        """Light up the part of the gizmo under the cursor; None: the cursor is elsewhere."""
+        part = None if xy is None else self.gizmo_part(*xy)
         if part != self.gizmo.hovered:
             self.gizmo.hovered = part
             self.request_render()
@@ -223,10 +223,10 @@ class Viewport:
         """The gizmo was attached, moved or detached: show it."""
         self.request_render()
 
-    def hover_axes(self, x: float, y: float) -> NDArray[np.float64] | None:
+    def hover_axes(self, xy: tuple[float, float] | None) -> NDArray[np.float64] | None:
         """Light up the end of the corner axes under the cursor: the world axis (3,) to look from on a click."""
         before = self.triad.hovered
-        axis = self.triad.hit(self.projection, x, y)
+        axis = self.triad.hit(self.projection, *(xy or (np.nan, np.nan)))
         if self.triad.hovered != before:
             self.request_render()
         return axis

@@ -20,7 +20,6 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import numpy as np
 from PySide6.QtCore import QEventLoop, QPoint, QPointF, Qt, QTimer
-from PySide6.QtGui import QSurfaceFormat
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
@@ -30,7 +29,7 @@ from splap_editor.engine.cache import StageCache
 from splap_editor.engine.edit import Pose
 from splap_editor.io.sample_maker import big_scene, write_sample
 from splap_editor.ui.theme import apply_theme
-from splap_editor.ui.viewport_widget import surface_format
+from splap_editor.ui.viewport_widget import ask_of_qt
 from tests.benchmark.peers import machine, note, report, timed
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -43,10 +42,10 @@ start = float(sys.argv[1])
 from PySide6.QtGui import QSurfaceFormat
 from PySide6.QtWidgets import QApplication
 from splap_editor.app import make_window
-from splap_editor.ui.actions.file_commands import sample_path
+from splap_editor.ui.actions.file_actions import sample_path
 from splap_editor.ui.theme import apply_theme
-from splap_editor.ui.viewport_widget import surface_format
-QSurfaceFormat.setDefaultFormat(surface_format())
+from splap_editor.ui.viewport_widget import ask_of_qt
+ask_of_qt()
 app = QApplication(sys.argv[:1])
 apply_theme(app)
 window = make_window()
@@ -284,7 +283,7 @@ def main() -> None:
     options = parser.parse_args()
     report(**machine())
     bench_start()
-    QSurfaceFormat.setDefaultFormat(surface_format())
+    ask_of_qt()
     app = QApplication(sys.argv[:1])
     apply_theme(app)
     sys.setswitchinterval(0.0005)  # as the program does

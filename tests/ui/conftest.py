@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PySide6.QtCore import QCoreApplication, QEvent, QPoint, QSettings, Qt
-from PySide6.QtGui import QSurfaceFormat
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
@@ -15,7 +14,7 @@ from splap_editor.app import make_window
 from splap_editor.resources import resource
 from splap_editor.ui.main_window import MainWindow
 from splap_editor.ui.theme import apply_theme
-from splap_editor.ui.viewport_widget import surface_format
+from splap_editor.ui.viewport_widget import ask_of_qt
 
 WAIT_MS = 60_000
 IDLE = ("ready", "settled")
@@ -24,7 +23,7 @@ IDLE = ("ready", "settled")
 @pytest.fixture(scope="session")
 def qapp_args() -> list[str]:
     """Set the surface format before the application is made, as the program does."""
-    QSurfaceFormat.setDefaultFormat(surface_format())
+    ask_of_qt()
     return ["splap-editor"]
 
 

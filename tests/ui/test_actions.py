@@ -34,7 +34,7 @@ def test_conditions_decide_what_can_be_used(driver):
 
 
 def test_help_sheet_names_every_shortcut(driver, qtbot):
-    sheet = HelpSheet(driver.window)
+    sheet = HelpSheet(ACTIONS, driver.window)
     qtbot.addWidget(sheet)
     from PySide6.QtWidgets import QLabel
 

@@ -148,7 +148,7 @@ def test_a_foreign_session_is_refused_in_a_sentence(driver, qtbot, tmp_path):
 
 
 def test_recent_files_open_again(driver, qtbot, tmp_path, ply):
-    recent = driver.window.document_commands.recent
+    recent = driver.window.document_actions.recent
     assert recent.paths == [ply]
     driver.open(TUBE)
     assert recent.paths == [ply], "the samples are always at hand"

@@ -137,9 +137,9 @@ def test_closing_while_a_job_runs_exits_with_0(tmp_path, moment):
         from splap_editor.app import make_window
         from splap_editor.core.handle_nodes import Region
         from splap_editor.engine.edit import Pose
-        from splap_editor.ui.viewport_widget import surface_format
+        from splap_editor.ui.viewport_widget import ask_of_qt
         QSettings.setPath(QSettings.Format.NativeFormat, QSettings.Scope.UserScope, {str(tmp_path)!r})
-        QSurfaceFormat.setDefaultFormat(surface_format())
+        ask_of_qt()
         app = QApplication(["splap-editor"])
         window = make_window()
         window._may_close = True

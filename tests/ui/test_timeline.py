@@ -32,7 +32,7 @@ def strip_of(driver) -> TimelineStrip:
 def keyed_strip(driver) -> TimelineStrip:
     """Ten frames; at rest in the first, lifted in the last, the line at the last."""
     strip = strip_of(driver)
-    commands = driver.window.timeline_commands
+    commands = driver.window.timeline_actions
     commands.set_key()
     commands.change("Change length", n_frames=10)
     commands.go_to(10)
@@ -157,7 +157,7 @@ def test_playing_shows_poses_and_stops_by_key(driver, qtbot):
     driver.scene.preview_changed.connect(lambda: frames.add(driver.scene.shown_edit.timeline.frame))
     driver.scene.pose_changed.connect(lambda: posed.append(driver.scene.kernels))
     driver.key(Qt.Key.Key_Space)
-    player = driver.window.timeline_commands.player
+    player = driver.window.timeline_actions.player
     assert player.is_playing and driver.window.actions_["timeline.play"].isChecked()
     qtbot.waitUntil(lambda: len(frames) >= 5 and len(posed) >= 3, timeout=WAIT_MS)
     driver.key(Qt.Key.Key_Space)
@@ -170,7 +170,7 @@ def test_playing_shows_poses_and_stops_by_key(driver, qtbot):
 def test_dragging_a_handle_stops_playing(driver, qtbot):
     keyed_strip(driver)
     driver.key(Qt.Key.Key_Space)
-    player = driver.window.timeline_commands.player
+    player = driver.window.timeline_actions.player
     qtbot.waitUntil(lambda: driver.scene.preview is not None, timeout=WAIT_MS)
     driver.session.preview_poses({driver.scene.edit.handles[0].handle_id: Pose((0.3, 0.0, 0.0))})
     qtbot.waitUntil(lambda: not player.is_playing, timeout=WAIT_MS)
@@ -212,7 +212,7 @@ def test_pictures_are_drawn_as_the_view_shows_them(driver, qtbot, tmp_path, kind
     keyed_strip(driver)
     driver.window.display.set(mode="ellipses", background="black")
     order = FrameOrder(kind, range(1, 4), tmp_path / "a.png", (80, 60))
-    driver.window.timeline_commands.export_frames(order)
+    driver.window.timeline_actions.export_frames(order)
     qtbot.waitUntil(lambda: driver.window.toast.text.startswith("Exported 3 frames"), timeout=WAIT_MS)
     pictures = []
     for number in (1, 2, 3):
@@ -226,7 +226,7 @@ def test_pictures_are_drawn_as_the_view_shows_them(driver, qtbot, tmp_path, kind
 def test_the_export_of_frames_can_be_cancelled(driver, qtbot, tmp_path):
     keyed_strip(driver)
     order = FrameOrder("pictures", range(1, 1000), tmp_path / "a.png", (40, 30))
-    driver.window.timeline_commands.export_frames(order)
+    driver.window.timeline_actions.export_frames(order)
     qtbot.waitUntil(lambda: any(tmp_path.glob("*.png")), timeout=WAIT_MS)
     assert driver.window.actions_["edit.stop"].isEnabled()
     driver.window.actions_["edit.stop"].trigger()
@@ -241,7 +241,7 @@ def test_the_export_of_frames_can_be_cancelled(driver, qtbot, tmp_path):
 def test_closing_while_frames_are_drawn_ends_cleanly(driver, qtbot, tmp_path):
     keyed_strip(driver)
     order = FrameOrder("pictures", range(1, 1000), tmp_path / "a.png", (40, 30))
-    driver.window.timeline_commands.export_frames(order)
+    driver.window.timeline_actions.export_frames(order)
     qtbot.waitUntil(lambda: any(tmp_path.glob("*.png")), timeout=WAIT_MS)
     driver.close()
     assert not any(thread.name.startswith("splap") for thread in threading.enumerate())

@@ -188,7 +188,7 @@ def test_gizmo_is_drawn_where_it_is_hit():
             [[viewport.gizmo_part(x + 0.5, y + 0.5) is not None for x in range(0, 400, 5)] for y in range(0, 300, 5)]
         )
         assert hits[plain[::5, ::5]].all()
-        assert viewport.hover_gizmo(*viewport.projection.pixel([0.0, 0.0, 0.0])) == DOT
+        assert viewport.hover_gizmo(viewport.projection.pixel([0.0, 0.0, 0.0])) == DOT
 
 
 def test_edges_follow_the_splats_and_vanish():
@@ -222,10 +222,10 @@ def test_corner_axes_are_clicked_where_they_are_drawn():
         picture = drawn(viewport)
         ends = viewport.triad._ends(viewport.projection)
         for i, axis in enumerate((*np.eye(3), *-np.eye(3))):
-            np.testing.assert_array_equal(viewport.hover_axes(*ends[i, :2]), axis)
+            np.testing.assert_array_equal(viewport.hover_axes(tuple(ends[i, :2])), axis)
             x, y = ends[i, :2].astype(int)
             assert np.abs(picture[y - 5, x] - 0.1).max() > 0.1
-        assert viewport.hover_axes(20.0, 280.0) is None
+        assert viewport.hover_axes((20.0, 280.0)) is None
 
 
 def test_reset_camera_shows_the_scene_upright_from_its_front():

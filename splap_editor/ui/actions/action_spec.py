@@ -1,6 +1,10 @@
 """What the table of actions is made of."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
+
+from splap_editor.ui.actions.conditions import State, always
 
 
 @dataclass(frozen=True)
@@ -10,7 +14,10 @@ class ActionSpec:
     Parameters
     ----------
     action_id : str
-        ``"file.open"``: the part before the dot names the object that carries it out, the part after it the method.
+        ``"file.open"``: how widgets, settings and tests name it.
+    act : callable
+        The method of one of the window's ``*Actions`` that carries it out, unbound. That of a checkable action
+        without a group takes the new state.
     text : str
         As in the menu; an ellipsis when a dialog follows.
     shortcuts : tuple of str
@@ -19,8 +26,8 @@ class ActionSpec:
         File name in ``resources/icons``, or empty.
     tip : str
         One sentence on what it does; the tooltip adds text and shortcut.
-    needs : str
-        Name of the condition under which it can be used; empty: always.
+    needs : callable
+        Whether it can be used.
     menu : str
         Title of the menu; a slash names a submenu. Empty: in no menu.
     group : str
@@ -32,11 +39,12 @@ class ActionSpec:
     """
 
     action_id: str
+    act: Callable[..., Any]
     text: str
     shortcuts: tuple[str, ...] = ()
     icon: str = ""
     tip: str = ""
-    needs: str = ""
+    needs: Callable[[State], bool] = always
     menu: str = ""
     group: str = ""
     checkable: bool = False

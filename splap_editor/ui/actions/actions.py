@@ -1,11 +1,14 @@
 """The action table as live actions."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from functools import partial
+from typing import Any
 
 from PySide6.QtGui import QAction, QActionGroup, QKeySequence
 from PySide6.QtWidgets import QWidget
 
-from splap_editor.ui.actions.action_table import ACTIONS, ActionSpec
+from splap_editor.ui.actions.action_spec import ActionSpec
+from splap_editor.ui.actions.conditions import State
 from splap_editor.ui.theme import icon
 
 
@@ -16,19 +19,22 @@ class ActionSet:
     ----------
     owner : QWidget
         The window in which the shortcuts hold.
-    performers : dict
-        Objects that carry the actions out, by the first part of the ids. A method that belongs to a checkable action
-        without a group takes the new state.
-    is_met : callable
-        ``is_met(condition)`` tells whether a ``needs`` holds.
+    specs : tuple of ActionSpec
+    performers : iterable
+        Objects that carry the actions out, one of each kind.
+    state : State
+        What tells which actions can be used.
     """
 
-    def __init__(self, owner: QWidget, performers: dict[str, object], is_met: Callable[[str], bool]) -> None:
-        self._is_met = is_met
+    def __init__(
+        self, owner: QWidget, specs: tuple[ActionSpec, ...], performers: Iterable[object], state: State
+    ) -> None:
+        self.specs = specs
+        self._state = state
         self._actions: dict[str, QAction] = {}
+        performers = tuple(performers)
         groups: dict[str, QActionGroup] = {}
-        for spec in ACTIONS:
-            part, _, method = spec.action_id.partition(".")
+        for spec in specs:
             action = QAction(spec.text, owner)
             action.setObjectName(spec.action_id)
             action.setShortcuts([QKeySequence(keys) for keys in spec.shortcuts])
@@ -40,7 +46,7 @@ class ActionSet:
                 action.setIconVisibleInMenu(False)
             if spec.group:
                 groups.setdefault(spec.group, QActionGroup(owner)).addAction(action)
-            perform = getattr(performers[part], method)
+            perform = _bound(spec.act, performers)
             if spec.checkable and not spec.group:
                 action.triggered.connect(perform)
             else:
@@ -54,12 +60,28 @@ class ActionSet:
 
     def refresh(self) -> None:
         """Enable what can be used."""
-        for spec in ACTIONS:
-            self._actions[spec.action_id].setEnabled(not spec.needs or self._is_met(spec.needs))
+        for spec in self.specs:
+            self._actions[spec.action_id].setEnabled(spec.needs(self._state))
 
     def check(self, action_id: str, checked: bool = True) -> None:
         """Show a state without performing the action."""
         self._actions[action_id].setChecked(checked)
+
+
+def _bound(act: Callable[..., Any], performers: Iterable[object]) -> Callable[..., Any]:
+    """Bind the method of an action to the object that has it.
+
+    Raises
+    ------
+    LookupError
+        None of the performers has it.
+    """
+    method = act.func if isinstance(act, partial) else act
+    for performer in performers:
+        if any(method in vars(kind).values() for kind in type(performer).__mro__):
+            bound = method.__get__(performer)
+            return partial(bound, *act.args, **act.keywords) if isinstance(act, partial) else bound
+    raise LookupError(f"nothing in the window carries out {method.__qualname__}")
 
 
 def tooltip(spec: ActionSpec) -> str:

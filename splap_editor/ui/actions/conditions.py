@@ -1,28 +1,137 @@
-"""Conditions of the action table that a scene meets or not."""
+"""When an action can be used: predicates over what the window holds."""
 
+from dataclasses import dataclass
+
+from splap_editor.core.graph.splat_graph import SplatGraph
+from splap_editor.session.cards import has_edge as is_joined
+from splap_editor.session.mends import fragments
 from splap_editor.session.scene import Scene
+from splap_editor.session.session import Session
+from splap_editor.ui.actions.graph_actions import GraphActions
 
 
-def scene_meets(scene: Scene, condition: str) -> bool:
-    """Whether a scene has what an action needs."""
-    if condition == "scene":
-        return True
-    if condition == "selection":
-        return bool(scene.selection.any())
-    if condition == "surface_selection":
-        return scene.surface is not None and bool(scene.selection.any())
-    if condition == "hidden":
-        return bool(scene.hidden.any())
-    if condition == "weights":
-        return scene.edit.method == "bbw" and bool(scene.edit.handles)
-    if condition == "handles":
-        return bool(scene.edit.handles)
-    if condition == "keys":
-        return bool(scene.edit.timeline.keys)
-    if condition == "key":
-        return scene.edit.timeline.frame in scene.edit.timeline.key_frames
-    if condition == "pins":
-        return bool(scene.edit.pins)
-    if condition == "active_handles":
-        return bool(scene.active_handles)
-    raise ValueError(f"unknown condition {condition!r}")
+@dataclass(frozen=True, eq=False)
+class State:
+    """What the predicates look at.
+
+    Parameters
+    ----------
+    session : Session
+    graph : GraphActions
+        Holds side A, and what is inspected.
+    """
+
+    session: Session
+    graph: GraphActions
+
+    @property
+    def scene(self) -> Scene | None:
+        """The scene shown."""
+        return self.session.scene
+
+    @property
+    def splat_graph(self) -> SplatGraph | None:
+        """Its graph, once it is prepared."""
+        return self.scene.surface.graph if has_surface(self) else None
+
+
+def always(state: State) -> bool:
+    """Whatever is open."""
+    return True
+
+
+def has_scene(state: State) -> bool:
+    """A file is open."""
+    return state.scene is not None
+
+
+def has_surface(state: State) -> bool:
+    """A file is open and prepared."""
+    return state.scene is not None and state.scene.surface is not None
+
+
+def has_selection(state: State) -> bool:
+    """Splats are selected."""
+    return state.scene is not None and bool(state.scene.selection.any())
+
+
+def has_selection_on_surface(state: State) -> bool:
+    """Splats are selected, and their neighbours known."""
+    return has_surface(state) and has_selection(state)
+
+
+def has_hidden(state: State) -> bool:
+    """Splats are hidden."""
+    return state.scene is not None and bool(state.scene.hidden.any())
+
+
+def has_weights(state: State) -> bool:
+    """Handles have weights to be shown."""
+    return has_handles(state) and state.scene.edit.method == "bbw"
+
+
+def has_handles(state: State) -> bool:
+    """There are handles."""
+    return state.scene is not None and bool(state.scene.edit.handles)
+
+
+def has_active_handles(state: State) -> bool:
+    """Handles are chosen."""
+    return state.scene is not None and bool(state.scene.active_handles)
+
+
+def has_pins(state: State) -> bool:
+    """Something is pinned."""
+    return state.scene is not None and bool(state.scene.edit.pins)
+
+
+def has_keys(state: State) -> bool:
+    """There are keys."""
+    return state.scene is not None and bool(state.scene.edit.timeline.keys)
+
+
+def is_on_key(state: State) -> bool:
+    """The frame shown has a key."""
+    return state.scene is not None and state.scene.edit.timeline.frame in state.scene.edit.timeline.key_frames
+
+
+def can_undo(state: State) -> bool:
+    """A step can be taken back."""
+    return state.session.history.can_undo
+
+
+def can_redo(state: State) -> bool:
+    """A step was taken back."""
+    return state.session.history.can_redo
+
+
+def is_busy(state: State) -> bool:
+    """Something is being worked on in the background."""
+    return state.session.worker.is_busy("open", "prepare", "bind", "pose", "export", "frames")
+
+
+def is_halted(state: State) -> bool:
+    """The background work was stopped, or failed."""
+    return state.session.state in ("halted", "failed")
+
+
+def has_edge(state: State) -> bool:
+    """The inspected edge joins its splats."""
+    graph, edge = state.splat_graph, state.graph.inspected.edge
+    return graph is not None and edge is not None and is_joined(state.scene.ellipses, graph, edge)
+
+
+def has_side_a(state: State) -> bool:
+    """One selection is kept as side A, and there is another."""
+    return has_selection_on_surface(state) and state.graph.kept is not None
+
+
+def has_fragments(state: State) -> bool:
+    """The scene does not hang together."""
+    graph = state.splat_graph
+    return graph is not None and len(fragments(graph)) > 0
+
+
+def has_mends(state: State) -> bool:
+    """Edges were cut or added by hand."""
+    return has_surface(state) and bool(state.scene.edit.graph.cut or state.scene.edit.graph.add)

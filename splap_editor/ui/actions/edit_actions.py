@@ -1,147 +1,30 @@
-"""The actions that change selection, handles and graph, with undo and redo."""
+"""Undo, redo, and the background work."""
 
-from splap_editor.ui.actions.action_spec import ActionSpec
+from splap_editor.session.session import Session
+from splap_editor.tools.tool_manager import ToolManager
 
-A = ActionSpec
 
-EDIT_ACTIONS: tuple[ActionSpec, ...] = (
-    A("edit.undo", "&Undo", ("Ctrl+Z",), "undo", "Take the last step back.", "undo", "&Edit"),
-    A("edit.redo", "&Redo", ("Ctrl+Shift+Z", "Ctrl+Y"), "redo", "Repeat the step taken back.", "redo", "&Edit"),
-    A(
-        "edit.stop",
-        "S&top background work",
-        ("Ctrl+.",),
-        "",
-        "Cancel what is being computed.",
-        "busy",
-        "&Edit",
-        breaks=True,
-    ),
-    A("edit.resume", "Resume bac&kground work", (), "", "Go on with what was stopped.", "halted", "&Edit"),
-    A("select.all", "&All", ("A",), "", "Select every splat that is not hidden.", "scene", "&Select"),
-    A("select.none", "&None", ("Alt+A", "Ctrl+Shift+A"), "", "Select nothing.", "selection", "&Select"),
-    A("select.invert", "&Invert", ("Ctrl+I",), "", "Swap selected and unselected.", "scene", "&Select"),
-    A(
-        "select.grow",
-        "&Grow",
-        ("Ctrl++", "Ctrl+="),
-        "",
-        "Add the neighbours on the surface.",
-        "surface_selection",
-        "&Select",
-        breaks=True,
-    ),
-    A("select.shrink", "S&hrink", ("Ctrl+-",), "", "Drop the rim of the selection.", "surface_selection", "&Select"),
-    A(
-        "select.connected",
-        "&Connected",
-        ("L",),
-        "",
-        "Select all that hangs together with it.",
-        "surface_selection",
-        "&Select",
-    ),
-    A(
-        "select.hide",
-        "Hi&de selected",
-        ("Shift+H",),
-        "eye-off",
-        "Neither draw nor pick them; they still bend.",
-        "selection",
-        "&Select",
-        breaks=True,
-    ),
-    A("select.isolate", "I&solate selected", ("Shift+I",), "", "Hide everything else.", "selection", "&Select"),
-    A("select.show_all", "Show a&ll", ("Alt+H",), "eye", "Bring hidden splats back.", "hidden", "&Select"),
-    A("sets.keep", "&Keep selection…", (), "", "Keep the selected splats under a name.", "selection", "&Select"),
-    A(
-        "select.through",
-        "Select &through",
-        ("Alt+Z",),
-        "through",
-        "Also select what lies behind; otherwise only what is visible.",
-        menu="&Select",
-        checkable=True,
-        breaks=True,
-    ),
-    A(
-        "handle.from_selection",
-        "&Handle from selection",
-        ("H",),
-        "handle",
-        "Move the selected splats as one handle.",
-        "selection",
-        "&Handle",
-    ),
-    A(
-        "handle.pin_selection",
-        "&Pin selection",
-        ("P",),
-        "pin",
-        "Hold the selected splats where they are.",
-        "selection",
-        "&Handle",
-    ),
-    A("handle.clear_pins", "&Clear pins", ("Alt+P",), "", "Let go of everything pinned.", "pins", "&Handle"),
-    A(
-        "handle.reset",
-        "&Reset pose",
-        ("Alt+G",),
-        "reset",
-        "Put the chosen handles back to rest.",
-        "active_handles",
-        "&Handle",
-        breaks=True,
-    ),
-    A(
-        "handle.reset_all",
-        "Reset a&ll poses",
-        ("Alt+Shift+G",),
-        "",
-        "Put every handle back to rest.",
-        "handles",
-        "&Handle",
-    ),
-    A(
-        "handle.delete",
-        "&Delete",
-        ("Delete", "Backspace"),
-        "trash",
-        "Delete the chosen handles.",
-        "active_handles",
-        "&Handle",
-    ),
-    A(
-        "pose.copy",
-        "&Copy pose",
-        ("Ctrl+C",),
-        "",
-        "Remember the poses of the chosen handles.",
-        "active_handles",
-        "&Handle",
-        breaks=True,
-    ),
-    A("pose.paste", "Pas&te pose", ("Ctrl+V",), "", "Give them to the chosen handles.", "active_handles", "&Handle"),
-    A("pose.mirror_x", "Across &X", (), "", "Pose the handle opposite in X.", "active_handles", "&Handle/&Mirror"),
-    A("pose.mirror_y", "Across &Y", (), "", "Pose the handle opposite in Y.", "active_handles", "&Handle/&Mirror"),
-    A("pose.mirror_z", "Across &Z", (), "", "Pose the handle opposite in Z.", "active_handles", "&Handle/&Mirror"),
-    A(
-        "pose.mirror_symmetry",
-        "By the object's &symmetry",
-        ("Ctrl+M",),
-        "",
-        "Find the plane that the object is mirrored about, and pose the handle opposite.",
-        "active_handles",
-        "&Handle/&Mirror",
-    ),
-    A(
-        "handle.local",
-        "&Local axes",
-        (",",),
-        "local",
-        "Turn the gizmo with the handle.",
-        menu="&Handle",
-        checkable=True,
-        breaks=True,
-    ),
-)
+class EditActions:
+    """Undo, redo, and the background work."""
+
+    def __init__(self, session: Session, tools: ToolManager) -> None:
+        self._session = session
+        self._tools = tools
+
+    def undo(self) -> None:
+        """Take the last step back; a drag under way is dropped first."""
+        self._tools.cancel()
+        self._session.history.undo()
+
+    def redo(self) -> None:
+        """Repeat the step taken back."""
+        self._tools.cancel()
+        self._session.history.redo()
+
+    def stop(self) -> None:
+        """Cancel the background work."""
+        self._session.halt()
+
+    def resume(self) -> None:
+        """Go on with it."""
+        self._session.resume()

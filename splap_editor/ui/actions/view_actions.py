@@ -1,184 +1,144 @@
-"""The actions that change what is seen: keys and frames, display, camera and window."""
+"""What the View menu does: the camera and the window."""
 
-from splap_editor.ui.actions.action_spec import ActionSpec
+import numpy as np
+from PySide6.QtCore import QObject, QVariantAnimation
+from PySide6.QtWidgets import QWidget
 
-A = ActionSpec
+from splap_editor.session.session import Session
+from splap_editor.viewport.camera import View, blended, scene_axes
+from splap_editor.viewport.scene_view import SceneView
 
-VIEW_ACTIONS: tuple[ActionSpec, ...] = (
-    A("timeline.play", "&Play", ("Space",), "play", "Show frame after frame.", "keys", "A&nimation", checkable=True),
-    A(
-        "timeline.set_key",
-        "Set &key",
-        ("Ctrl+K",),
-        "key",
-        "Keep the poses of all handles at this frame.",
-        "handles",
-        "A&nimation",
-        breaks=True,
-    ),
-    A("timeline.delete_key", "&Delete key", ("Ctrl+Alt+K",), "", "Forget the key at this frame.", "key", "A&nimation"),
-    A(
-        "timeline.next_key",
-        "&Next key",
-        ("Ctrl+Shift+Right",),
-        "",
-        "Go to the next key.",
-        "keys",
-        "A&nimation",
-        breaks=True,
-    ),
-    A(
-        "timeline.previous_key",
-        "P&revious key",
-        ("Ctrl+Shift+Left",),
-        "",
-        "Go to the key before.",
-        "keys",
-        "A&nimation",
-    ),
-    A("timeline.next_frame", "Next &frame", ("Ctrl+Right",), "", "Go one frame on.", "scene", "A&nimation"),
-    A("timeline.previous_frame", "Previous fra&me", ("Ctrl+Left",), "", "Go one frame back.", "scene", "A&nimation"),
-    A(
-        "timeline.smooth",
-        "&Smooth between keys",
-        (),
-        "",
-        "Move through the keys without corners; otherwise straight from one to the next.",
-        "scene",
-        "A&nimation",
-        checkable=True,
-        breaks=True,
-    ),
-    A(
-        "timeline.auto_key",
-        "&Automatic keys",
-        (),
-        "",
-        "Once there is a key, posing a handle sets one.",
-        "scene",
-        "A&nimation",
-        checkable=True,
-    ),
-    A(
-        "timeline.export",
-        "&Export frames…",
-        ("Ctrl+Shift+E",),
-        "",
-        "Write a PLY or a picture for each frame, or pictures all round.",
-        "scene",
-        "A&nimation",
-        breaks=True,
-    ),
-    A(
-        "display.ellipses",
-        "&Ellipses",
-        ("1",),
-        "ellipses",
-        "Draw the exact occupied ellipses.",
-        menu="&View",
-        group="mode",
-        checkable=True,
-    ),
-    A(
-        "display.splats",
-        "&Splats",
-        ("2",),
-        "splats",
-        "Draw the true, blended Gaussians.",
-        menu="&View",
-        group="mode",
-        checkable=True,
-    ),
-    A("display.points", "&Points", ("3",), "points", "Draw centres only.", menu="&View", group="mode", checkable=True),
-    A(
-        "display.deformed",
-        "&Deformed",
-        (),
-        "",
-        "Show the edit.",
-        menu="&View/S&how",
-        group="shown",
-        checkable=True,
-        breaks=True,
-    ),
-    A(
-        "display.original",
-        "&Original",
-        (),
-        "",
-        "Show the file as it is.",
-        menu="&View/S&how",
-        group="shown",
-        checkable=True,
-    ),
-    A(
-        "display.both",
-        "&Both",
-        (),
-        "",
-        "Show the edit over a ghost of the original.",
-        menu="&View/S&how",
-        group="shown",
-        checkable=True,
-    ),
-    A(
-        "display.weights",
-        "Show &weights",
-        ("Shift+W",),
-        "",
-        "Show how much each splat follows the chosen handle (bounded biharmonic weights).",
-        "weights",
-        "&View",
-        checkable=True,
-    ),
-    A(
-        "view.frame_selection",
-        "&Frame selection",
-        ("F", "Num+."),
-        "frame",
-        "Fly to the selection, else to the chosen handles.",
-        "scene",
-        "&View",
-        breaks=True,
-    ),
-    A("view.frame_all", "Frame &all", ("Home",), "", "Fly to where everything is in view.", "scene", "&View"),
-    A("view.front", "F&ront", ("Alt+1", "Num+1"), "", "Look along +Y.", "scene", "&View/A&xis"),
-    A("view.back", "&Back", ("Alt+Ctrl+1", "Ctrl+Num+1"), "", "Look along −Y.", "scene", "&View/A&xis"),
-    A("view.right", "R&ight", ("Alt+3", "Num+3"), "", "Look along −X.", "scene", "&View/A&xis"),
-    A("view.left", "&Left", ("Alt+Ctrl+3", "Ctrl+Num+3"), "", "Look along +X.", "scene", "&View/A&xis"),
-    A("view.top", "&Top", ("Alt+7", "Num+7"), "", "Look down.", "scene", "&View/A&xis"),
-    A("view.bottom", "Botto&m", ("Alt+Ctrl+7", "Ctrl+Num+7"), "", "Look up.", "scene", "&View/A&xis"),
-    A(
-        "view.orthographic",
-        "Ortho&graphic",
-        ("Alt+5", "Num+5"),
-        "perspective",
-        "No perspective.",
-        menu="&View",
-        checkable=True,
-    ),
-    A(
-        "view.turntable",
-        "&Turntable",
-        (),
-        "turntable",
-        "Keep the horizon level while orbiting.",
-        menu="&View",
-        checkable=True,
-    ),
-    A("view.up_z", "&Z up", (), "", "Turn about Z.", "scene", "&View/&Up", group="up", checkable=True),
-    A("view.up_y", "&Y up", (), "", "Turn about Y.", "scene", "&View/&Up", group="up", checkable=True),
-    A("view.down_y", "Y &down", (), "", "Turn about Y, upside down.", "scene", "&View/&Up", group="up", checkable=True),
-    A(
-        "timeline.show",
-        "Time&line",
-        ("Ctrl+T",),
-        "",
-        "Show or hide the frames under the picture.",
-        menu="&View",
-        checkable=True,
-        breaks=True,
-    ),
-    A("view.panels", "Panel&s", ("N",), "panel", "Show or hide the panels.", menu="&View", checkable=True),
-    A("view.full_screen", "F&ull screen", ("F11",), "", "Fill the screen.", menu="&View", checkable=True),
-)
+FLIGHT_MS = 220
+
+
+class ViewActions(QObject):
+    """Flies the camera, shows and hides parts of the window.
+
+    Parameters
+    ----------
+    window : QWidget
+        Goes full screen.
+    dock : QWidget
+        The panels.
+    """
+
+    def __init__(self, session: Session, view: SceneView, window: QWidget, dock: QWidget) -> None:
+        super().__init__(window)
+        self._session = session
+        self._view = view
+        self._viewport = view.viewport
+        self._window = window
+        self._dock = dock
+        self._flight = QVariantAnimation(self, duration=FLIGHT_MS, startValue=0.0, endValue=1.0)
+        self._flight.valueChanged.connect(self._on_flown)
+        self._flight.finished.connect(view.viewport.end_motion)
+        self._ends: tuple[View, View] | None = None
+        self._frame_again: View | None = None
+        session.state_changed.connect(self._on_state_changed)
+
+    def fly_to(self, end: View) -> None:
+        """Move the camera there, quickly enough not to wait for."""
+        if self._flight.state() == QVariantAnimation.State.Running:
+            self._flight.stop()
+            self._viewport.end_motion()
+        self._ends = (self._viewport.camera.view, end)
+        self._viewport.begin_motion()
+        self._flight.start()
+
+    def _on_flown(self, share: float) -> None:
+        start, end = self._ends
+        # Slow at the end: the eye finds its place again.
+        self._viewport.camera.view = blended(start, end, 1.0 - (1.0 - share) ** 3)
+        self._viewport.camera_moved()
+
+    def frame_selection(self) -> None:
+        """Fly to the selection, else to the chosen handles, else to everything."""
+        scene = self._session.scene
+        rows = np.flatnonzero(scene.selection & ~scene.hidden)
+        if not len(rows):
+            rows = self._view.rows_of_handles(scene.active_handles)
+        if len(rows):
+            self.fly_to(self._viewport.frame(rows))
+        else:
+            self.frame_all()
+
+    def frame_all(self) -> None:
+        """Fly to where everything is in view; after the pose that is on its way, if one is, once more."""
+        self.fly_to(self._viewport.frame())
+        if self._session.state not in ("ready", "settled"):
+            self._frame_again = self._ends[1]
+
+    def _on_state_changed(self) -> None:
+        if self._frame_again is None or self._session.state not in ("ready", "settled"):
+            return
+        asked, self._frame_again = self._frame_again, None
+        is_flying = self._flight.state() == QVariantAnimation.State.Running
+        # Who has moved the camera since is not carried off.
+        if (is_flying and self._ends[1] is asked) or self._viewport.camera.view.is_near(asked):
+            self.fly_to(self._viewport.frame())
+
+    def front(self) -> None:
+        """Look at the front."""
+        self._look_from(1, -1.0)
+
+    def back(self) -> None:
+        """Look at the back."""
+        self._look_from(1, 1.0)
+
+    def right(self) -> None:
+        """Look from the right."""
+        self._look_from(0, 1.0)
+
+    def left(self) -> None:
+        """Look from the left."""
+        self._look_from(0, -1.0)
+
+    def top(self) -> None:
+        """Look down."""
+        self._look_from(2, 1.0)
+
+    def bottom(self) -> None:
+        """Look up."""
+        self._look_from(2, -1.0)
+
+    def _look_from(self, axis: int, sign: float) -> None:
+        """Fly to the end of one of right, away and up."""
+        camera = self._viewport.camera
+        self.fly_to(camera.look_from(sign * scene_axes(camera.world_up)[axis]))
+
+    def orthographic(self, on: bool) -> None:
+        """Drop perspective, or bring it back."""
+        self._viewport.camera.set_parallel(on)
+        self._viewport.camera_moved()
+
+    def turntable(self, on: bool) -> None:
+        """Keep the horizon level."""
+        self._viewport.camera.is_turntable = on
+
+    def up_z(self) -> None:
+        """Stand the scene on its XY plane."""
+        self._stand((0.0, 0.0, 1.0))
+
+    def up_y(self) -> None:
+        """Stand the scene on its XZ plane."""
+        self._stand((0.0, 1.0, 0.0))
+
+    def down_y(self) -> None:
+        """Stand the scene on its XZ plane, upside down, as most captures want it."""
+        self._stand((0.0, -1.0, 0.0))
+
+    def _stand(self, up: tuple[float, float, float]) -> None:
+        self._viewport.camera.world_up = np.array(up)
+        self._viewport.reset_camera()
+        self._viewport.camera_moved()
+
+    def panels(self, on: bool) -> None:
+        """Show or hide the panels."""
+        self._dock.setVisible(on)
+
+    def full_screen(self, on: bool) -> None:
+        """Fill the screen."""
+        if on:
+            self._window.showFullScreen()
+        else:
+            self._window.showNormal()

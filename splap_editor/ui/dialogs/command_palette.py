@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from splap_editor.ui.actions.action_table import ACTIONS, ActionSpec
+from splap_editor.ui.actions.action_spec import ActionSpec
 from splap_editor.ui.actions.actions import ActionSet, shown_keys
 from splap_editor.ui.dialogs.fuzzy import fuzzy_score
 from splap_editor.ui.theme import FAINT, QUIET, RAISED, STEP, TEXT
@@ -64,7 +64,7 @@ class CommandPalette(QDialog):
         self.setObjectName("palette")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self._actions = actions
-        self._specs = {spec.action_id: spec for spec in ACTIONS if spec.action_id != "program.palette"}
+        self._specs = {spec.action_id: spec for spec in actions.specs if spec.action_id != "program.palette"}
         self.field = QLineEdit(placeholderText="Type what you want to do")
         self.field.textChanged.connect(self._show)
         self.field.installEventFilter(self)

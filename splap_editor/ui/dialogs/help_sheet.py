@@ -1,26 +1,25 @@
 """The help sheet: every key and gesture on one page."""
 
+from collections.abc import Iterable
+
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QDialog, QGridLayout, QHBoxLayout, QLabel, QScrollArea, QVBoxLayout, QWidget
 
-from splap_editor.ui.actions.action_table import ACTIONS, MENUS
-from splap_editor.ui.actions.actions import shown_keys
-from splap_editor.ui.gestures import GESTURES
+from splap_editor.ui.actions.action_spec import ActionSpec
+from splap_editor.ui.gestures import key_blocks
 from splap_editor.ui.theme import STEP
 
 COLUMN_PX = 400
 
 
 class HelpSheet(QDialog):
-    """Made from the action table and the gesture table; F1 or Escape closes it."""
+    """Made from the tables of actions and tools; F1 or Escape closes it."""
 
-    def __init__(self, parent: QWidget) -> None:
+    def __init__(self, specs: Iterable[ActionSpec], parent: QWidget) -> None:
         super().__init__(parent)
         self.setWindowTitle("Keys and gestures")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        blocks = [(title, list(rows)) for title, rows in GESTURES.items()]
-        blocks += [(menu.replace("&", ""), _action_rows(menu)) for menu in MENUS]
-        blocks = [block for block in blocks if block[1]]
+        blocks = list(key_blocks(specs).items())
         page = QWidget()
         columns = QHBoxLayout(page)
         columns.setContentsMargins(6 * STEP, 5 * STEP, 6 * STEP, 6 * STEP)
@@ -40,14 +39,6 @@ class HelpSheet(QDialog):
         room = parent.size()
         wanted = page.sizeHint()
         self.resize(min(wanted.width() + 16, room.width() - 32), min(wanted.height() + 4, room.height() - 32))
-
-
-def _action_rows(menu: str) -> list[tuple[str, str]]:
-    return [
-        (" or ".join(shown_keys(keys) for keys in spec.shortcuts[:2]), spec.label)
-        for spec in ACTIONS
-        if spec.menu.split("/")[0] == menu and spec.shortcuts
-    ]
 
 
 def _in_columns(blocks: list, n_columns: int) -> list[list]:

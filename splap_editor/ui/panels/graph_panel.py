@@ -23,7 +23,7 @@ from splap_editor.session.graph_preview import GraphPreview
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.ui.actions.actions import ActionSet
-from splap_editor.ui.actions.graph_commands import GraphCommands
+from splap_editor.ui.actions.graph_actions import GraphActions
 from splap_editor.ui.theme import STEP
 from splap_editor.ui.widgets.number_field import set_tone
 from splap_editor.ui.widgets.options_form import FieldHint, OptionsForm
@@ -50,14 +50,14 @@ class GraphPanel(QWidget):
         session: Session,
         view: GraphView,
         preview: GraphPreview,
-        commands: GraphCommands,
+        mending: GraphActions,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
         self._session = session
         self._view = view
         self._preview = preview
-        self._commands = commands
+        self._mending = mending
         self._wanted: GraphOptions | None = None
         self._listed: SplatGraph | None = None
         self._segments = QHBoxLayout()
@@ -83,7 +83,7 @@ class GraphPanel(QWidget):
         self._add_parts()
         view.changed.connect(self._show_view)
         preview.changed.connect(self._show_estimate)
-        commands.kept_changed.connect(self._show_mends)
+        mending.kept_changed.connect(self._show_mends)
         SceneFollower(session, self._on_scene_changed, surface_changed=self._show, edit_changed=self._show)
         self._show()
 
@@ -188,8 +188,8 @@ class GraphPanel(QWidget):
         scene = self._session.scene
         options = scene.edit.graph if scene is not None else GraphOptions()
         words = f"{len(options.cut):,} cut and {len(options.add):,} added by hand" if options.cut or options.add else ""
-        if self._commands.kept is not None:
-            words += f"{'; s' if words else 'S'}ide A has {np.count_nonzero(self._commands.kept):,} splats"
+        if self._mending.kept is not None:
+            words += f"{'; s' if words else 'S'}ide A has {np.count_nonzero(self._mending.kept):,} splats"
         self.mends.setText(words)
         self.mends.setVisible(bool(words))
 

@@ -7,7 +7,7 @@ from splap_editor.engine.timeline import LAST_FRAME
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.ui.actions.actions import ActionSet
-from splap_editor.ui.actions.timeline_commands import TimelineCommands
+from splap_editor.ui.actions.timeline_actions import TimelineActions
 from splap_editor.ui.theme import STEP
 from splap_editor.ui.timeline.ruler import TimelineRuler
 from splap_editor.ui.widgets.number_field import NumberField
@@ -19,13 +19,13 @@ class TimelineStrip(QWidget):
     Parameters
     ----------
     session : Session
-    commands : TimelineCommands
+    timeline : TimelineActions
         Carry out what is done here.
     actions : ActionSet
     """
 
     def __init__(
-        self, session: Session, commands: TimelineCommands, actions: ActionSet, parent: QWidget | None = None
+        self, session: Session, timeline: TimelineActions, actions: ActionSet, parent: QWidget | None = None
     ) -> None:
         super().__init__(parent)
         self.setObjectName("headerBar")
@@ -50,15 +50,15 @@ class TimelineStrip(QWidget):
         layout.addWidget(QLabel("at"))
         layout.addWidget(self.fps_field)
         layout.addWidget(QLabel("fps"))
-        self.ruler.scrubbed.connect(commands.scrub)
-        self.ruler.chosen.connect(commands.go_to)
-        self.ruler.key_moved.connect(commands.move_key)
-        self.ruler.key_deleted.connect(commands.delete_key_at)
-        self.frame_field.committed.connect(lambda frame: commands.go_to(int(frame)))
-        self.length_field.committed.connect(lambda n: commands.change("Change length", n_frames=int(n)))
-        self.fps_field.committed.connect(lambda fps: commands.change("Change speed", fps=float(fps)))
-        commands.shown_changed.connect(self.setVisible)
-        commands.player.playing_changed.connect(lambda on: actions.check("timeline.play", on))
+        self.ruler.scrubbed.connect(timeline.scrub)
+        self.ruler.chosen.connect(timeline.go_to)
+        self.ruler.key_moved.connect(timeline.move_key)
+        self.ruler.key_deleted.connect(timeline.delete_key_at)
+        self.frame_field.committed.connect(lambda frame: timeline.go_to(int(frame)))
+        self.length_field.committed.connect(lambda n: timeline.change("Change length", n_frames=int(n)))
+        self.fps_field.committed.connect(lambda fps: timeline.change("Change speed", fps=float(fps)))
+        timeline.shown_changed.connect(self.setVisible)
+        timeline.player.playing_changed.connect(lambda on: actions.check("timeline.play", on))
         SceneFollower(session, self._show, edit_changed=self._show, preview_changed=self._show)
         self.hide()
 

@@ -63,7 +63,7 @@ def _hint(known: Option) -> FieldHint:
     return FieldHint(
         known.label,
         known.sentence,
-        "%" if known.is_percent else "",
+        "%" if known.is_percent else "px" if known.unit == "px" else "",
         factor * max(low, -_WIDEST),
         min(factor * known.most, _WIDEST),
         factor * known.step,

@@ -4,12 +4,12 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
 
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
-from splap_editor.tools.tool import ToolManager
+from splap_editor.tools.tool_manager import ToolManager
 from splap_editor.ui.theme import STEP
 
 
 class StateLine(QWidget):
-    """Says what the chosen tool does, and how many splats there are, selected and hidden."""
+    """Says what pointer and keys do, and how many splats there are, selected and hidden."""
 
     def __init__(self, session: Session, tools: ToolManager, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -24,12 +24,12 @@ class StateLine(QWidget):
         layout.addWidget(self.hint)
         layout.addWidget(self.counts)
         SceneFollower(session, self._show_counts, selection_changed=self._show_counts, hidden_changed=self._show_counts)
-        tools.chosen_changed.connect(self.show_hint)
+        tools.hint_changed.connect(self.show_hint)
         self.show_hint()
 
     def show_hint(self) -> None:
-        """Show the chosen tool's hint."""
-        self.hint.setText(self._tools.chosen.hint)
+        """Say what pointer and keys do just now."""
+        self.hint.setText(self._tools.hint)
 
     def _show_counts(self) -> None:
         scene = self._session.scene

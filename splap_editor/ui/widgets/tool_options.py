@@ -1,18 +1,20 @@
 """The bar over the viewport: options of the chosen tool at the left, the display at the right."""
 
 from dataclasses import replace
+from typing import Any
 
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QWidget
+from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QLabel, QToolButton, QWidget
 
-from splap_editor.tools.handle_tool import RADIUS_RANGE, HandleTool
-from splap_editor.tools.select_tool import SelectTool
-from splap_editor.tools.tool import ToolManager
+from splap_editor.tools.tool import Held
+from splap_editor.tools.tool_manager import ToolManager
+from splap_editor.tools.tool_table import TOOLS
 from splap_editor.ui.actions.actions import ActionSet
 from splap_editor.ui.theme import STEP
 from splap_editor.ui.widgets.number_field import NumberField, ScrubLabel
+from splap_editor.ui.widgets.options_form import FieldHint, hints_of
 
-NAMES = {"handle": "Handle", "pin": "Pin", "select": "Select", "inspect": "Inspect"}
+TITLES = {entry.name: entry.title for entry in TOOLS}
 
 
 class ToolOptionsBar(QWidget):
@@ -30,15 +32,16 @@ class ToolOptionsBar(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self._tools = tools
         self._title = QLabel()
-        self._title.setMinimumWidth(52)
+        self._title.setMinimumWidth(64)
         self._title.setStyleSheet("font-weight: 600;")
-        self._pages = {name: self._page(name) for name in tools.tools}
+        kinds = dict.fromkeys(kind for tool in tools.tools.values() for kind in tool.option_kinds)
+        self.forms = {kind: HeldForm(tools.context.held(kind)) for kind in kinds}
         layout = QHBoxLayout(self)
         layout.setContentsMargins(3 * STEP, STEP, 2 * STEP, STEP)
         layout.setSpacing(2 * STEP)
         layout.addWidget(self._title)
-        for page in self._pages.values():
-            layout.addWidget(page)
+        for form in self.forms.values():
+            layout.addWidget(form)
         layout.addStretch(1)
         for group in (
             ("edit.undo", "edit.redo"),
@@ -52,67 +55,57 @@ class ToolOptionsBar(QWidget):
             for action_id in group:
                 strip.addWidget(_icon_button(actions, action_id))
             layout.addLayout(strip)
-        self._through = actions["select.through"]
-        self._add_through(actions)
         tools.chosen_changed.connect(self._show)
         self._show()
 
-    def _page(self, name: str) -> QWidget:
-        tool = self._tools.tools[name]
-        page = QWidget()
-        row = QHBoxLayout(page)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(STEP)
-        if isinstance(tool, HandleTool):
-            field = NumberField(100 * RADIUS_RANGE[0], 100 * RADIUS_RANGE[1], decimals=1, step=0.5, unit="%")
-            field.setToolTip("Radius of the disc on the surface, of the size of the scene; [ and ] change it too")
-            field.setFixedWidth(64)
-            field.committed.connect(lambda share: tool.set_radius(share / 100))
-            grip = ScrubLabel("Reach", field)
-            grip.moved.connect(lambda share: tool.set_radius(share / 100))
-            tool.radius_changed.connect(lambda: field.show_value(100 * tool.radius))
-            field.show_value(100 * tool.radius)
-            row.addWidget(grip)
-            row.addWidget(field)
-        elif isinstance(tool, SelectTool):
-            field = NumberField(3, 400, decimals=0, step=2, unit="px")
-            field.setToolTip("Radius of the brush; [ and ] change it too")
-            field.setFixedWidth(64)
-            field.committed.connect(lambda size: self._set_brush(tool, size))
-            grip = ScrubLabel("Brush", field)
-            grip.moved.connect(lambda size: self._set_brush(tool, size))
-
-            def show() -> None:
-                for part in (grip, field):
-                    part.setVisible(tool.options.shape == "brush")
-                field.show_value(tool.options.brush_px)
-                self._show()
-
-            tool.options_changed.connect(show)
-            row.addWidget(grip)
-            row.addWidget(field)
-            for part in (grip, field):
-                part.setVisible(tool.options.shape == "brush")
-        return page
-
-    def _add_through(self, actions: ActionSet) -> None:
-        for name, tool in self._tools.tools.items():
-            if isinstance(tool, SelectTool):
-                button = _icon_button(actions, "select.through")
-                button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
-                button.setText("Through")
-                self._pages[name].layout().addWidget(button)
-
-    @staticmethod
-    def _set_brush(tool: SelectTool, size: float) -> None:
-        tool.set_options(replace(tool.options, brush_px=size))
-
     def _show(self) -> None:
         chosen = self._tools.chosen
-        for name, page in self._pages.items():
-            page.setVisible(self._tools.tools[name] is chosen)
-        shape = chosen.options.shape if isinstance(chosen, SelectTool) else ""
-        self._title.setText({"lasso": "Lasso", "brush": "Brush"}.get(shape, NAMES.get(chosen.name, chosen.name)))
+        for kind, form in self.forms.items():
+            form.setVisible(kind in chosen.option_kinds)
+        self._title.setText(TITLES[chosen.name])
+
+
+class HeldForm(QWidget):
+    """Options of a tool in a row, made from what their fields say about themselves; the tool's own changes show."""
+
+    def __init__(self, held: Held) -> None:
+        super().__init__()
+        self._held = held
+        self.editors: dict[str, QWidget] = {}
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(STEP)
+        self._hints = hints_of(held.value)
+        for name, hint in self._hints.items():
+            self.editors[name] = self._editor(name, hint, row)
+        held.changed.connect(self._show)
+        self._show()
+
+    def _editor(self, name: str, hint: FieldHint, row: QHBoxLayout) -> QWidget:
+        if isinstance(getattr(self._held.value, name), bool):
+            editor = QCheckBox(hint.label, toolTip=hint.tip)
+            editor.toggled.connect(lambda on: self._take(name, on))
+        else:
+            editor = NumberField(hint.low, hint.high, decimals=hint.decimals, step=hint.step, unit=hint.unit)
+            editor.setToolTip(hint.tip)
+            editor.setFixedWidth(64)
+            grip = ScrubLabel(hint.label, editor)
+            for told in (editor.committed, grip.moved):
+                told.connect(lambda number: self._take(name, number / hint.factor))
+            row.addWidget(grip)
+        row.addWidget(editor)
+        return editor
+
+    def _take(self, name: str, value: Any) -> None:
+        self._held.set(replace(self._held.value, **{name: value}))
+
+    def _show(self) -> None:
+        for name, editor in self.editors.items():
+            value = getattr(self._held.value, name)
+            if isinstance(editor, QCheckBox):
+                editor.setChecked(value)
+            else:
+                editor.show_value(self._hints[name].factor * value)
 
 
 def _icon_button(actions: ActionSet, action_id: str) -> QToolButton:

@@ -15,7 +15,7 @@ from splap_editor.session.documents import Documents, MissingPlyError
 from splap_editor.session.saved_state import Look
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
-from splap_editor.ui.actions.file_commands import folder_to_write, sample_path, sentence
+from splap_editor.ui.actions.file_actions import folder_to_write, sample_path, sentence
 from splap_editor.ui.actions.recent_files import RecentFiles
 from splap_editor.ui.display import Display
 from splap_editor.ui.widgets.toast import Toast
@@ -25,7 +25,7 @@ from splap_editor.viewport.viewport import Viewport
 SESSION_FILTER = f"SpLap session (*{SUFFIX})"
 
 
-class DocumentCommands:
+class DocumentActions:
     """Everything that opens or saves a session.
 
     Parameters

@@ -15,10 +15,8 @@ from splap_editor.session.signals import Signal
 from splap_editor.viewport.graph_view import SHOWN, GraphView
 from splap_editor.viewport.inspect_view import InspectView
 
-CONDITIONS = ("surface", "edge", "kept", "fragments", "mends")
 
-
-class GraphCommands:
+class GraphActions:
     """Cuts and joins; each is one undoable step of the edit.
 
     `kept_changed` tells that another selection is kept as side A.
@@ -39,26 +37,9 @@ class GraphCommands:
         self.kept_changed = Signal()
         self._session = session
         self._graph_view = graph_view
-        self._inspected = inspected
+        self.inspected = inspected
         self._say = say
         SceneFollower(session, self._forget)
-
-    def meets(self, condition: str) -> bool:
-        """Whether a condition of `CONDITIONS` holds."""
-        scene = self._session.scene
-        if scene is None or scene.surface is None:
-            return False
-        if condition == "edge":
-            return self._inspected.edge is not None and has_edge(
-                scene.ellipses, scene.surface.graph, self._inspected.edge
-            )
-        if condition == "kept":
-            return self.kept is not None and bool(scene.selection.any())
-        if condition == "fragments":
-            return len(fragments(scene.surface.graph)) > 0
-        if condition == "mends":
-            return bool(scene.edit.graph.cut or scene.edit.graph.add)
-        return True
 
     # Edges in view ------------------------------------------------------------------------------------------------
 
@@ -82,15 +63,19 @@ class GraphCommands:
 
     def cut_edge(self) -> None:
         """Cut the inspected edge."""
-        if self.meets("edge"):
-            self._cut([self._inspected.edge], "Cut edge")
+        edge = self.inspected.edge
+        if edge is not None and self._is_joined(edge):
+            self._cut([edge], "Cut edge")
 
     def toggle_edge(self) -> None:
         """Cut the inspected edge, or join the two splats if there is none."""
-        if self.meets("edge"):
+        edge, scene = self.inspected.edge, self._session.scene
+        if edge is None or scene is None or scene.surface is None:
+            return
+        if self._is_joined(edge):
             self.cut_edge()
-        elif self._inspected.edge is not None and self.meets("surface"):
-            self._change(with_added(self._options, [self._inspected.edge]), "Add edge")
+        else:
+            self._change(with_added(self._options, [edge]), "Add edge")
 
     def keep_selection(self) -> None:
         """Remember the selection as side A."""
@@ -136,6 +121,10 @@ class GraphCommands:
     @property
     def _options(self) -> GraphOptions:
         return self._session.scene.edit.graph
+
+    def _is_joined(self, edge: tuple[int, int]) -> bool:
+        scene = self._session.scene
+        return scene is not None and scene.surface is not None and has_edge(scene.ellipses, scene.surface.graph, edge)
 
     def _cut(self, pairs: Iterable[tuple[int, int]], label: str) -> None:
         self._change(with_cut(self._options, pairs), label)

@@ -12,7 +12,7 @@ from splap_editor.engine.keyframes import edit_at_frame, keyed_edit
 from splap_editor.engine.timeline import Timeline
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
-from splap_editor.ui.actions.file_commands import sentence
+from splap_editor.ui.actions.file_actions import sentence
 from splap_editor.ui.dialogs.frames_dialog import FramesDialog
 from splap_editor.ui.timeline.frame_export import FrameOrder, submit_frames
 from splap_editor.ui.timeline.player import Player
@@ -20,7 +20,7 @@ from splap_editor.ui.widgets.toast import Toast
 from splap_editor.viewport.viewport import Viewport
 
 
-class TimelineCommands(QObject):
+class TimelineActions(QObject):
     """Keys are undoable steps; going from frame to frame is none, as looking from elsewhere is none.
 
     Parameters

@@ -16,14 +16,16 @@ from splap_editor.session.bound_edit import column_lacks
 from splap_editor.session.documents import Documents
 from splap_editor.session.session import Session
 from splap_editor.ui.dialogs.export_dialog import ExportDialog
+from splap_editor.ui.dialogs.picture_dialog import PictureDialog
 from splap_editor.ui.widgets.toast import Toast
+from splap_editor.viewport.viewport import Viewport
 
 OPEN_FILTER = "Splat PLY or session (*.ply *.splap);;All files (*)"
 EDIT_FILTER = "Edit (*.json);;All files (*)"
 SAMPLE = "windmill_2dgs.ply"
 
 
-class FileCommands:
+class FileActions:
     """Everything that reads or writes a file.
 
     Parameters
@@ -32,6 +34,8 @@ class FileCommands:
         Parent of the dialogs.
     session : Session
     documents : Documents
+    viewport : Viewport
+        Its picture can be saved.
     toast : Toast
         Where results and refusals are said.
     save_then : callable
@@ -43,12 +47,14 @@ class FileCommands:
         window: QWidget,
         session: Session,
         documents: Documents,
+        viewport: Viewport,
         toast: Toast,
         save_then: Callable[[Callable[[], None]], None],
     ) -> None:
         self._window = window
         self._session = session
         self._documents = documents
+        self._viewport = viewport
         self._save_then = save_then
         self._toast = toast
         self._after_export: Callable[[], None] | None = None
@@ -125,7 +131,7 @@ class FileCommands:
 
     def picture(self) -> None:
         """Ask for a size, and write the view as a PNG."""
-        self._window.show_picture_dialog()
+        PictureDialog(self._window, self._viewport, self._session.scene.file.path, self._toast).open()
 
     def quit(self) -> None:
         """Close the window."""

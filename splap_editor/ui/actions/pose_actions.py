@@ -11,7 +11,7 @@ from splap_editor.session.session import Session
 from splap_editor.ui.widgets.toast import Toast
 
 
-class PoseCommands:
+class PoseActions:
     """Each is one undoable step.
 
     Parameters

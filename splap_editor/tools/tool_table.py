@@ -1,0 +1,84 @@
+"""Every tool that can be chosen: a module, a row here and an icon make one."""
+
+from dataclasses import dataclass
+
+from splap_editor.tools.axes_tool import AxesTool
+from splap_editor.tools.bindings import Binding
+from splap_editor.tools.brush_tool import BrushTool
+from splap_editor.tools.click_tool import ClickTool
+from splap_editor.tools.handle_tool import HandleTool
+from splap_editor.tools.inspect_tool import InspectTool
+from splap_editor.tools.lasso_tool import LassoTool
+from splap_editor.tools.navigate_tool import NavigateTool
+from splap_editor.tools.pin_tool import PinTool
+from splap_editor.tools.rectangle_tool import RectangleTool
+from splap_editor.tools.tool import Tool, ToolContext
+from splap_editor.tools.tool_manager import ToolManager
+from splap_editor.tools.transform_tool import TransformTool
+
+
+@dataclass(frozen=True)
+class ToolEntry:
+    """One tool as menus, tool column and help know it.
+
+    Parameters
+    ----------
+    kind : type of Tool
+    text : str
+        As in the menu, with a mnemonic.
+    key : str
+        Shortcut, or empty.
+    tip : str
+        One sentence. The icon in ``resources/icons`` has the tool's name.
+    group : str
+        Tools of a group stand together, and share a block of the help sheet.
+    """
+
+    kind: type[Tool]
+    text: str
+    key: str
+    tip: str
+    group: str
+
+    @property
+    def name(self) -> str:
+        """Name of the tool."""
+        return self.kind.name
+
+    @property
+    def title(self) -> str:
+        """The text without its mnemonic."""
+        return self.text.replace("&", "")
+
+
+TOOLS: tuple[ToolEntry, ...] = (
+    ToolEntry(RectangleTool, "&Rectangle", "Q", "Drag a frame to select splats, or click them.", "Select"),
+    ToolEntry(LassoTool, "&Lasso", "K", "Draw round splats to select them.", "Select"),
+    ToolEntry(BrushTool, "&Brush", "C", "Paint a selection.", "Select"),
+    ToolEntry(ClickTool, "&Click", "Shift+Q", "Select splats one by one; a drag looks around.", "Select"),
+    ToolEntry(HandleTool, "&Handle", "W", "Click the surface to place a handle.", "Place handles and pins"),
+    ToolEntry(PinTool, "&Pin", "E", "Click the surface to hold it in place.", "Place handles and pins"),
+    ToolEntry(InspectTool, "&Inspect", "I", "See a splat's card and neighbours, or an edge's.", "Inspect"),
+)
+
+FIRST = HandleTool.name
+"""The tool in use at the start."""
+
+
+def made_tools(context: ToolContext) -> ToolManager:
+    """Make all tools, and whoever passes events to them."""
+    navigation = NavigateTool(context)
+    context.orbit = navigation.stroke
+    standing = (AxesTool(context), TransformTool(context))
+    return ToolManager(context, {entry.name: entry.kind(context) for entry in TOOLS}, standing, navigation, FIRST)
+
+
+def bindings_by_group() -> dict[str, tuple[Binding, ...]]:
+    """All rows that need telling, by the title they are told under; standing tools first."""
+    groups: dict[str, tuple[Binding, ...]] = {
+        "Look around": (*NavigateTool.bindings, *AxesTool.bindings),
+        "Handles": (*TransformTool.bindings, *TransformTool.active_bindings),
+    }
+    for entry in TOOLS:
+        groups[entry.group] = (*groups.get(entry.group, ()), *entry.kind.bindings)
+    return {title: tuple(row for row in rows if row.sentence) for title, rows in groups.items()}

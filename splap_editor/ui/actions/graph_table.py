@@ -1,0 +1,96 @@
+"""The Graph menu."""
+
+from splap_editor.ui.actions.action_spec import ActionSpec
+from splap_editor.ui.actions.conditions import (
+    has_edge,
+    has_fragments,
+    has_mends,
+    has_selection,
+    has_side_a,
+    has_surface,
+)
+from splap_editor.ui.actions.graph_actions import GraphActions
+
+A = ActionSpec
+
+GRAPH_TABLE: tuple[ActionSpec, ...] = (
+    A("graph.off", GraphActions.off, "No &edges", tip="Draw no edges.", menu="G&raph", group="edges", checkable=True),
+    A(
+        "graph.near",
+        GraphActions.near,
+        "Edges &near",
+        tip="Draw the edges around the selection and the inspected splat.",
+        menu="G&raph",
+        group="edges",
+        checkable=True,
+    ),
+    A(
+        "graph.all",
+        GraphActions.all,
+        "&All edges",
+        tip="Draw every edge.",
+        menu="G&raph",
+        group="edges",
+        checkable=True,
+    ),
+    A(
+        "graph.cycle",
+        GraphActions.cycle,
+        "Next edge &view",
+        ("J",),
+        tip="None, near, all.",
+        needs=has_surface,
+        menu="G&raph",
+    ),
+    A(
+        "graph.cut_edge",
+        GraphActions.cut_edge,
+        "&Cut edge",
+        tip="Cut the inspected edge; X does so with the Inspect tool.",
+        needs=has_edge,
+        menu="G&raph",
+        breaks=True,
+    ),
+    A(
+        "graph.keep_selection",
+        GraphActions.keep_selection,
+        "Selection is &side A",
+        tip="Remember the selection, to cut or join it and the next.",
+        needs=has_selection,
+        menu="G&raph",
+        breaks=True,
+    ),
+    A(
+        "graph.cut_between",
+        GraphActions.cut_between,
+        "Cut A &from selection",
+        tip="Cut every edge between them.",
+        needs=has_side_a,
+        menu="G&raph",
+    ),
+    A(
+        "graph.join",
+        GraphActions.join,
+        "&Join A and selection",
+        tip="Add the edges that join them best.",
+        needs=has_side_a,
+        menu="G&raph",
+    ),
+    A(
+        "graph.join_fragments",
+        GraphActions.join_fragments,
+        "Join f&ragments",
+        tip="Tie every small component to what is around it.",
+        needs=has_fragments,
+        menu="G&raph",
+        breaks=True,
+    ),
+    A(
+        "graph.clear_mends",
+        GraphActions.clear_mends,
+        "Clear &mends",
+        tip="Take every cut and every added edge back.",
+        needs=has_mends,
+        menu="G&raph",
+    ),
+)

@@ -1,0 +1,61 @@
+"""Making, posing and deleting handles and pins."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from splap_editor.engine.edit import Pose
+from splap_editor.session.placement import rows_region
+from splap_editor.session.session import Session
+from splap_editor.viewport.viewport import Viewport
+
+
+class HandleActions:
+    """Making, posing and deleting handles and pins."""
+
+    def __init__(self, session: Session, viewport: Viewport) -> None:
+        self._session = session
+        self._viewport = viewport
+
+    def from_selection(self) -> None:
+        """Make the selected splats a handle."""
+        self._session.add_handle(self._selected_region())
+
+    def pin_selection(self) -> None:
+        """Hold the selected splats where they are."""
+        self._session.add_pin(self._selected_region())
+
+    def clear_pins(self) -> None:
+        """Let go of all pins."""
+        self._session.change_edit(replace(self._session.scene.edit, pins=()), "Clear pins")
+
+    def reset(self) -> None:
+        """Put the chosen handles back to rest."""
+        scene = self._session.scene
+        self._reset(scene.active_handles, "Reset pose")
+
+    def reset_all(self) -> None:
+        """Put every handle back to rest."""
+        scene = self._session.scene
+        self._reset(tuple(handle.handle_id for handle in scene.edit.handles), "Reset all poses")
+
+    def delete(self) -> None:
+        """Delete the chosen handles."""
+        scene = self._session.scene
+        n = len(scene.active_handles)
+        label = "Delete handle" if n == 1 else f"Delete {n} handles"
+        self._session.change_edit(scene.edit.without_handles(scene.active_handles), label)
+
+    def local(self, on: bool) -> None:
+        """Turn the gizmo with the handle."""
+        self._viewport.gizmo.is_local = on
+        self._viewport.gizmo_changed()
+
+    def _reset(self, handle_ids: tuple[int, ...], label: str) -> None:
+        edit = self._session.scene.edit
+        if any(not edit.handle(handle_id).pose.is_identity for handle_id in handle_ids):
+            self._session.change_edit(edit.with_poses(dict.fromkeys(handle_ids, Pose())), label)
+
+    def _selected_region(self):
+        scene = self._session.scene
+        return rows_region(scene, np.flatnonzero(scene.selection))

@@ -1,0 +1,72 @@
+"""What the Select menu does."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from splap_editor.session.scene import Scene
+from splap_editor.session.selection import connected_selection, grown_selection, shrunk_selection
+from splap_editor.session.session import Session
+from splap_editor.tools.select_tool import SelectOptions
+from splap_editor.tools.tool import Held
+
+
+class SelectActions:
+    """Selecting and hiding by name; each is one undoable step."""
+
+    def __init__(self, session: Session, options: Held[SelectOptions]) -> None:
+        self._session = session
+        self._options = options
+
+    @property
+    def _scene(self) -> Scene:
+        return self._session.scene
+
+    def all(self) -> None:
+        """Select every splat that is not hidden."""
+        self._select(~self._scene.hidden, "Select all")
+
+    def none(self) -> None:
+        """Select nothing."""
+        self._select(np.zeros_like(self._scene.selection), "Select none")
+
+    def invert(self) -> None:
+        """Swap selected and unselected among the visible."""
+        self._select(~self._scene.selection & ~self._scene.hidden, "Invert selection")
+
+    def grow(self) -> None:
+        """Add the neighbours on the surface."""
+        scene = self._scene
+        self._select(grown_selection(scene.selection, scene.ellipses, scene.surface.graph), "Grow selection")
+
+    def shrink(self) -> None:
+        """Drop the rim."""
+        scene = self._scene
+        self._select(shrunk_selection(scene.selection, scene.ellipses, scene.surface.graph), "Shrink selection")
+
+    def connected(self) -> None:
+        """Select all that hangs together with the selection."""
+        scene = self._scene
+        self._select(connected_selection(scene.selection, scene.ellipses, scene.surface.graph), "Select connected")
+
+    def hide(self) -> None:
+        """Hide the selected splats."""
+        self._hide(self._scene.hidden | self._scene.selection, "Hide selected")
+
+    def isolate(self) -> None:
+        """Hide all but the selected splats."""
+        self._hide(~self._scene.selection, "Isolate selected")
+
+    def show_all(self) -> None:
+        """Hide nothing."""
+        self._hide(np.zeros_like(self._scene.hidden), "Show all")
+
+    def through(self, on: bool) -> None:
+        """Select what lies behind as well."""
+        self._options.set(replace(self._options.value, through=on))
+
+    def _select(self, mask: np.ndarray, label: str) -> None:
+        self._session.change_mask("selection", mask, label)
+
+    def _hide(self, mask: np.ndarray, label: str) -> None:
+        self._session.change_mask("hidden", mask, label)
