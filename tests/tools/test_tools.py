@@ -26,11 +26,13 @@ def test_a_click_places_and_a_drag_orbits(hand):
     assert not hand.scene.edit.handles
     assert not hand.viewport.camera.view.is_near(before)
     assert not hand.viewport.is_moving
-    hand.placed()
+    assert hand.placed().pose.is_identity
+
+
+def test_a_click_pins(hand):
     hand.tools.choose("pin")
-    hand.click(beside(hand.surface(), 60, 0))
-    hand.settle()
-    assert len(hand.scene.edit.handles) + len(hand.scene.edit.pins) == 2
+    hand.click(hand.surface())
+    assert len(hand.scene.edit.pins) == 1 and not hand.scene.edit.handles
 
 
 @pytest.mark.parametrize(("how", "factor"), [("]", 1.15), ("[", 1 / 1.15), ("wheel", 1.15)])

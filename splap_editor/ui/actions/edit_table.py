@@ -189,7 +189,7 @@ EDIT_TABLE: tuple[ActionSpec, ...] = (
     A(
         "handle.clear_pins",
         HandleActions.clear_pins,
-        "&Clear pins",
+        "Cl&ear pins",
         ("Alt+P",),
         tip="Let go of everything pinned.",
         needs=has_pins,
@@ -209,7 +209,7 @@ EDIT_TABLE: tuple[ActionSpec, ...] = (
     A(
         "handle.reset_all",
         HandleActions.reset_all,
-        "Reset a&ll poses",
+        "Reset &all poses",
         ("Alt+Shift+G",),
         tip="Put every handle back to rest.",
         needs=has_handles,

@@ -305,7 +305,7 @@ VIEW_TABLE: tuple[ActionSpec, ...] = (
     A(
         "view.panels",
         ViewActions.panels,
-        "Panel&s",
+        "Pa&nels",
         ("N",),
         icon="panel",
         tip="Show or hide the panels.",
@@ -315,7 +315,7 @@ VIEW_TABLE: tuple[ActionSpec, ...] = (
     A(
         "view.full_screen",
         ViewActions.full_screen,
-        "F&ull screen",
+        "Full s&creen",
         ("F11",),
         tip="Fill the screen.",
         menu="&View",

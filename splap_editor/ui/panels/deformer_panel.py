@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from PySide6.QtCore import QEvent, QObject, Signal
-from PySide6.QtWidgets import QCheckBox, QComboBox, QGridLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QCheckBox, QGridLayout, QLabel, QVBoxLayout, QWidget
 
 from splap_editor.engine.edit import Edit
 from splap_editor.session.scene import Scene
@@ -12,6 +12,7 @@ from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.ui.panels.weights_form import WeightsForm
 from splap_editor.ui.theme import STEP
+from splap_editor.ui.widgets.choices import Choice
 from splap_editor.ui.widgets.number_field import NumberField, set_tone
 from splap_editor.ui.widgets.options_form import FieldHint, OptionsForm, form_label
 
@@ -89,7 +90,7 @@ class DeformerPanel(QWidget):
         self.state = QLabel(wordWrap=True)
         self.timing = QLabel()
         self.timing.setProperty("tone", "quiet")
-        self.method = QComboBox()
+        self.method = Choice()
         for name, words in METHODS.items():
             self.method.addItem(words, name)
         self.method.currentIndexChanged.connect(

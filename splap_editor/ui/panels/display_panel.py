@@ -6,6 +6,7 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QSlider, QT
 from splap_editor.ui.actions.actions import ActionSet
 from splap_editor.ui.display import Display
 from splap_editor.ui.theme import STEP
+from splap_editor.ui.widgets.choices import Slider
 from splap_editor.ui.widgets.number_field import NumberField
 from splap_editor.ui.widgets.options_form import FieldHint, OptionsForm, form_label
 
@@ -40,9 +41,7 @@ class DisplayPanel(QWidget):
         self.sliders: dict[str, QSlider] = {}
         self.fields: dict[str, NumberField] = {}
         for row, (name, (text, low, high, decimals, tip)) in enumerate(SLIDERS.items()):
-            slider = QSlider(
-                Qt.Orientation.Horizontal, minimum=round(low * 100), maximum=round(high * 100), toolTip=tip
-            )
+            slider = Slider(Qt.Orientation.Horizontal, minimum=round(low * 100), maximum=round(high * 100), toolTip=tip)
             slider.setFocusPolicy(Qt.FocusPolicy.NoFocus)
             field = NumberField(low, high, decimals=decimals, step=0.05)
             field.setFixedWidth(56)

@@ -13,6 +13,7 @@ from splap_editor.session.neighbor_sets import NEIGHBOR_KINDS
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.ui.theme import STEP
+from splap_editor.ui.widgets.choices import Choice
 from splap_editor.ui.widgets.number_field import NumberField
 from splap_editor.ui.widgets.options_form import form_label
 from splap_editor.viewport.inspect_view import BOTH_COLOR, FIRST_COLOR, SECOND_COLOR, InspectView
@@ -211,7 +212,7 @@ def _words(kind: str) -> str:
 
 
 def _kind_combo(tip: str, none: str = "") -> QComboBox:
-    combo = QComboBox(toolTip=tip)
+    combo = Choice(toolTip=tip)
     if none:
         combo.addItem(none, "")
     for kind, words in NEIGHBOR_KINDS.items():

@@ -7,6 +7,7 @@ from splap_editor.io.layout import AXIS_NAMES
 from splap_editor.io.layouts import suiting_layouts
 from splap_editor.io.ply import SplatFile
 from splap_editor.ui.theme import STEP
+from splap_editor.ui.widgets.choices import Choice
 from splap_editor.ui.widgets.options_form import form_label
 
 AXIS_WORDS = {None: "Thinnest axis", 0: "Axis 0", 1: "Axis 1", 2: "Axis 2"}
@@ -25,8 +26,8 @@ class LayoutForm(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._file: SplatFile | None = None
-        self.layouts = QComboBox(toolTip="Read the file as another trainer's.")
-        self.axes = QComboBox(toolTip="The local axis that points out of the surface.")
+        self.layouts = Choice(toolTip="Read the file as another trainer's.")
+        self.axes = Choice(toolTip="The local axis that points out of the surface.")
         for box in (self.layouts, self.axes):
             box.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         self.layouts.activated.connect(lambda index: self._choose_layout(self.layouts.itemData(index)))

@@ -14,14 +14,21 @@ AXIS_COLORS = ("#f2746b", "#8fcf5f", "#6ea8ff")
 
 
 def euler_degrees(quat: ArrayLike) -> NDArray[np.float64]:
-    """Angles (x, y, z) in degrees of ``R = Rz Ry Rx`` for a unit quaternion w x y z; at the pole z is 0."""
+    """Angles (x, y, z) in degrees of ``R = Rz Ry Rx`` for a unit quaternion w x y z; at the pole z is 0.
+
+    Of the two triples that mean a rotation it is the one that turns less in all: a turn by 120° about Y and then by
+    40° about Z is told as these, not as (-180, 60, -140).
+    """
     R = quats_to_matrices(np.asarray(quat, np.float64)[None])[0]
     y = np.arcsin(np.clip(-R[2, 0], -1.0, 1.0))
     if abs(R[2, 0]) < 1.0 - 1e-9:
         x, z = np.arctan2(R[2, 1], R[2, 2]), np.arctan2(R[1, 0], R[0, 0])
     else:
         x, z = np.arctan2(-R[1, 2], R[1, 1]), 0.0
-    return np.degrees([x, y, z])
+    angles = np.array([x, y, z])
+    other = np.array([x - np.copysign(np.pi, x), np.copysign(np.pi, y) - y, z - np.copysign(np.pi, z)])
+    # Rounding must not decide between two that turn as far.
+    return np.degrees(min(angles, other, key=lambda each: round(np.abs(each).sum(), 9)))
 
 
 def quat_of_euler(degrees: ArrayLike) -> tuple[float, float, float, float]:

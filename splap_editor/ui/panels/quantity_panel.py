@@ -8,6 +8,7 @@ from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.selection import SelectionMode, combined_selection
 from splap_editor.session.session import Session
 from splap_editor.ui.theme import STEP
+from splap_editor.ui.widgets.choices import Choice
 from splap_editor.ui.widgets.histogram import Histogram
 from splap_editor.ui.widgets.number_field import NumberField
 from splap_editor.ui.widgets.options_form import form_label
@@ -23,12 +24,12 @@ class QuantityPanel(QWidget):
         self._session = session
         self._view = view
         self._before: np.ndarray | None = None
-        self.choice = QComboBox(toolTip="Colour the splats by this number")
+        self.choice = Choice(toolTip="Colour the splats by this number")
         self.choice.addItem("Own colours", "")
         for name, quantity in QUANTITIES.items():
             self.choice.addItem(quantity.label, name)
         self.choice.currentIndexChanged.connect(lambda index: view.set(name=self.choice.itemData(index)))
-        self.colormap = QComboBox(toolTip="Colour map; all can be told apart by colour-blind eyes")
+        self.colormap = Choice(toolTip="Colour map; all can be told apart by colour-blind eyes")
         for name in COLORMAPS:
             self.colormap.addItem(name.replace("-", " – ").capitalize(), name)
         self.colormap.currentIndexChanged.connect(lambda index: view.set(colormap=self.colormap.itemData(index)))

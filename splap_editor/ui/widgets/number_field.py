@@ -59,10 +59,14 @@ class NumberField(QDoubleSpinBox):
             event.ignore()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Enter and Escape give the keyboard back to the viewport."""
+        """Enter takes what was typed, Escape drops it; both leave the keyboard to the window."""
+        if event.key() == Qt.Key.Key_Escape:
+            self.setValue(self.value())
+            self.lineEdit().setModified(False)
         super().keyPressEvent(event)
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Escape):
             self.clearFocus()
+            event.ignore()
 
 
 class ScrubLabel(QLabel):

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QCheckBox, QComboBox, QGridLayout, QLabel, QWidget
 
 from splap_editor.core.options import Option, options_of
 from splap_editor.ui.theme import STEP
+from splap_editor.ui.widgets.choices import Choice
 from splap_editor.ui.widgets.number_field import NumberField
 
 LABEL_PX = 84
@@ -134,7 +135,7 @@ class OptionsForm(QWidget):
 
     def _editor(self, name: str, hint: FieldHint, value: Any) -> QWidget:
         if hint.choices:
-            editor = QComboBox()
+            editor = Choice()
             for choice, words in hint.choices.items():
                 editor.addItem(words, choice)
             editor.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)

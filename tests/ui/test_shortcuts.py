@@ -1,0 +1,146 @@
+"""No key is claimed twice, and keys reach what they are for wherever the focus is."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QKeySequence, QWheelEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QAbstractItemView,
+    QAbstractSpinBox,
+    QApplication,
+    QComboBox,
+    QLabel,
+    QMenu,
+    QSlider,
+)
+
+from splap_editor.ui.actions.action_table import ACTIONS, MENUS
+
+ALT = Qt.KeyboardModifier.AltModifier
+
+
+def test_no_mnemonic_of_the_menu_bar_is_a_shortcut_too(empty_window):
+    claimed = Counter(keys.toString() for spec in ACTIONS for keys in empty_window.actions_[spec.action_id].shortcuts())
+    claimed.update(QKeySequence.mnemonic(title).toString() for title in MENUS)
+    assert all(claimed), "every menu has a mnemonic, every shortcut is one that Qt reads"
+    claimed.update(button.shortcut().toString() for button in empty_window.findChildren(QAbstractButton))
+    claimed.pop("", None)
+    assert [keys for keys, n in claimed.items() if n > 1] == []
+
+
+def test_no_two_entries_of_a_menu_share_a_mnemonic(empty_window):
+    for menu in empty_window.findChildren(QMenu):
+        found = Counter(QKeySequence.mnemonic(action.text()).toString() for action in menu.actions())
+        found.pop("", None)
+        assert [keys for keys, n in found.items() if n > 1] == [], menu.title()
+
+
+def test_show_all_and_reset_pose_answer_their_keys(driver):
+    scene = driver.scene
+    driver.session.change_mask("hidden", np.arange(scene.splats.n_splats) < 50, "Hide")
+    driver.key(Qt.Key.Key_H, ALT)
+    assert not scene.hidden.any()
+    driver.click(driver.surface_pixel())
+    driver.wait_idle()
+    for key in (Qt.Key.Key_G, Qt.Key.Key_X, Qt.Key.Key_1, Qt.Key.Key_Return):
+        driver.key(key)
+    assert not scene.edit.is_identity
+    driver.key(Qt.Key.Key_G, ALT)
+    assert scene.edit.is_identity
+    driver.wait_idle()
+
+
+def focused(driver, widget):
+    driver.window.activateWindow()
+    driver.qtbot.waitUntil(driver.window.isActiveWindow)
+    widget.setFocus()
+    assert widget.hasFocus()
+    return widget
+
+
+def test_the_keyboard_starts_with_the_picture(empty_window, qtbot):
+    empty_window.activateWindow()
+    qtbot.waitUntil(empty_window.isActiveWindow)
+    assert QApplication.focusWidget() is empty_window.viewport
+
+
+@pytest.mark.parametrize("key", [Qt.Key.Key_Return, Qt.Key.Key_Escape])
+def test_return_and_escape_give_the_keyboard_back(driver, key):
+    field = focused(driver, driver.window.deformer_panel.free_radius)
+    QTest.keyClick(field, key)
+    assert driver.window.viewport.hasFocus()
+
+
+def test_escape_drops_what_was_typed(driver):
+    field = focused(driver, driver.window.deformer_panel.free_radius)
+    before = driver.scene.edit
+    field.selectAll()
+    QTest.keyClicks(field, "0.7")
+    QTest.keyClick(field, Qt.Key.Key_Escape)
+    assert driver.scene.edit is before
+
+
+def test_single_keys_work_with_the_focus_on_a_switch_or_a_choice(driver):
+    display = driver.window.display
+    panel = driver.window.deformer_panel
+    for widget in (panel.whole, panel.method):
+        focused(driver, widget)
+        index = panel.method.currentIndex()
+        QTest.keyPress(widget, Qt.Key.Key_O)
+        assert display.options.shown == "original"
+        QTest.keyRelease(widget, Qt.Key.Key_O)
+        assert display.options.shown == "deformed"
+        QTest.keyClick(widget, Qt.Key.Key_3)
+        assert display.options.mode == "points"
+        display.set(mode="splats")
+        QTest.keyClick(widget, Qt.Key.Key_Q)
+        assert driver.window.tools.chosen.name == "rectangle"
+        driver.window.tools.choose("handle")
+        assert panel.method.currentIndex() == index
+
+
+def wheel_taker(widget):
+    """Turn the wheel a notch down over a widget, and say who takes it: the event goes up as Qt passes it on."""
+    while widget is not None:
+        at, turn, none = QPointF(widget.rect().center()), QPoint(0, -120), QPoint()
+        held = (Qt.MouseButton.NoButton, Qt.KeyboardModifier.NoModifier, Qt.ScrollPhase.NoScrollPhase)
+        event = QWheelEvent(at, QPointF(widget.mapToGlobal(at.toPoint())), none, turn, *held, False)
+        # What is switched off leaves the event to its parent, without saying so.
+        if QApplication.sendEvent(widget, event) and event.isAccepted():
+            return widget
+        widget = widget.parentWidget()
+    return None
+
+
+def values(controls):
+    return [each.currentIndex() if isinstance(each, QComboBox) else each.value() for each in controls]
+
+
+def test_the_wheel_over_the_panels_changes_nothing_but_the_scroll(driver):
+    window, scene = driver.window, driver.scene
+    scroll = window.dock.widget()
+    window.viewport.setFocus()
+    page, bar = scroll.widget(), scroll.verticalScrollBar()
+    controls = [each for kind in (QComboBox, QAbstractSpinBox, QSlider) for each in page.findChildren(kind)]
+    edit, options, before = scene.edit, window.display.options, values(controls)
+    assert len(controls) > 20 and bar.maximum() > 0
+    for widget in [*page.findChildren(QAbstractButton), *page.findChildren(QLabel), *controls]:
+        bar.setValue(0)
+        taker = wheel_taker(widget)
+        assert values(controls) == before, widget.objectName() or widget.toolTip()
+        # A list scrolls its own lines.
+        if not isinstance(widget.parentWidget(), QAbstractItemView):
+            assert taker is scroll.viewport() and bar.value() > 0, widget.objectName() or widget.toolTip()
+    assert scene.edit is edit and window.display.options == options
+    assert all(each.focusPolicy() is not Qt.FocusPolicy.WheelFocus for each in controls), "the wheel takes no focus"
+
+
+def test_the_wheel_turns_a_choice_that_has_the_focus(driver):
+    method = focused(driver, driver.window.deformer_panel.method)
+    assert wheel_taker(method) is method
+    assert method.currentIndex() == 1
+    driver.wait_idle()
