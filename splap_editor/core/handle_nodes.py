@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from splap_editor.core.deformer import Handles
+from splap_editor.core.index_spaces import FileRows, Nodes
 from splap_editor.core.splats.occupancy import Ellipses
 
 
@@ -29,7 +30,7 @@ class Region:
 
     center: NDArray[np.float64]
     radius: float = 0.0
-    rows: NDArray[np.int64] | None = None
+    rows: FileRows | None = None
 
 
 def handle_nodes(
@@ -91,7 +92,7 @@ def handle_nodes(
     return Handles(indices=indices, labels=labels[indices], centers=centers, cage_radii=cages)
 
 
-def _nodes_in(region: Region, ellipses: Ellipses, tree: cKDTree) -> NDArray[np.int64]:
+def _nodes_in(region: Region, ellipses: Ellipses, tree: cKDTree) -> Nodes:
     """Nodes of one region: at least one."""
     center = np.asarray(region.center, np.float64)
     if center.shape != (3,) or not np.isfinite(center).all():

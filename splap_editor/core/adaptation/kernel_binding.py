@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from splap_editor.core.graph.splat_graph import SplatGraph
+from splap_editor.core.index_spaces import RowsByPlace
 from splap_editor.core.progress import Progress, no_progress
 from splap_editor.core.splats.occupancy import Ellipses
 from splap_editor.core.splats.rotations import quats_to_matrices
@@ -44,7 +45,7 @@ class RestArrays(NamedTuple):
 
     means: NDArray[np.float64]
     axes_f32: NDArray[np.float32]
-    order: NDArray[np.int64]
+    order: RowsByPlace
     ellipses: NDArray[np.float64]
 
 
@@ -154,7 +155,7 @@ class KernelBinding:
             self.inert_weights[finite] = weights / weights.sum(axis=1, keepdims=True)
 
     @property
-    def order(self) -> NDArray[np.int64]:
+    def order(self) -> RowsByPlace:
         """(N,) file row of each place in carried order: the nodes, then the inert splats."""
         return self.rest.order
 

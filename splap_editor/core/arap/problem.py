@@ -14,6 +14,7 @@ from splap_editor.core.arap.local_kernels import (
     write_global_rhs,
 )
 from splap_editor.core.arap.rotation_fit import nearest_rotations
+from splap_editor.core.index_spaces import Nodes, ProblemRows
 from splap_editor.core.linear_solvers import SpdFactor
 
 PIN = -1
@@ -137,7 +138,7 @@ class ArapProblem:
         outer = inner.copy()
         # A held row whose rotation is fitted needs all its spokes, those to other held nodes included.
         outer[W[inner & ~clamped].indices] = True
-        self.nodes: NDArray[np.int64] = np.flatnonzero(outer)
+        self.nodes: Nodes = np.flatnonzero(outer)
         self.rest = np.ascontiguousarray(rest[self.nodes])
         self.beta = float(beta)
         has_energy = inner[self.nodes]
@@ -150,7 +151,7 @@ class ArapProblem:
         self._indptr, self._indices = W.indptr.astype(np.int32), W.indices.astype(np.int32)
         self._weights = W.data
         self.is_free = np.ascontiguousarray(free[self.nodes]).view(np.uint8)
-        self.free_rows = np.flatnonzero(free[self.nodes])
+        self.free_rows: ProblemRows = np.flatnonzero(free[self.nodes])
         self.turn_rows = np.flatnonzero(has_energy & ~fixed)
         self._turn_index = np.full(len(self.nodes), -1, np.int32)
         self._turn_index[self.turn_rows] = np.arange(len(self.turn_rows), dtype=np.int32)

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.graph.ellipse_offset import disc_rows, one_way_touch, two_way_touch
+from splap_editor.core.index_spaces import NodesByPlace, Places
 from splap_editor.core.splats.occupancy import Ellipses
 
 _LEAF = 4
@@ -51,8 +52,8 @@ class EllipseTree:
         empty slot's box is inverted and infinitely far from everything.
     """
 
-    nodes: NDArray[np.int64]
-    places: NDArray[np.int64]
+    nodes: NodesByPlace
+    places: Places
     discs: NDArray[np.float64]
     reaches: NDArray[np.float64]
     classes: NDArray[np.int64]

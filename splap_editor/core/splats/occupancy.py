@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.index_spaces import FileRows, Nodes
 from splap_editor.core.splats.morton import morton_order
 from splap_editor.core.splats.rotations import quats_to_matrices
 from splap_editor.core.splats.splats import Splats
@@ -68,7 +69,7 @@ class Ellipses:
         `InertReason` of each splat in file order.
     """
 
-    rows: NDArray[np.int64]
+    rows: FileRows
     centers: NDArray[np.float64]
     semi_axes: NDArray[np.float64]
     normals: NDArray[np.float64]
@@ -84,7 +85,7 @@ class Ellipses:
         return len(self.rows)
 
     @cached_property
-    def node_of_row(self) -> NDArray[np.int64]:
+    def node_of_row(self) -> Nodes:
         """(N,) node of each file row, -1 for an inert splat."""
         nodes = np.full(self.n_splats, -1, np.int64)
         nodes[self.rows] = np.arange(self.n_nodes)
