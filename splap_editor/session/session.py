@@ -10,7 +10,7 @@ import numpy as np
 from splap_editor.core.handle_nodes import Region
 from splap_editor.core.index_spaces import FileMask
 from splap_editor.engine.cache import StageCache
-from splap_editor.engine.edit import HANDLE_COLORS, Edit, Handle, Pose, binds_like, poses_like
+from splap_editor.engine.edit import HANDLE_COLORS, Edit, Handle, Pose
 from splap_editor.engine.keyframes import auto_keyed_edit
 from splap_editor.engine.recipe_edit import edit_of, recipe_of
 from splap_editor.io.recipe import read_recipe, write_recipe
@@ -96,11 +96,7 @@ class Session:
     @property
     def has_unexported_edit(self) -> bool:
         """Whether the edit differs from the one last exported (or from the file's own pose)."""
-        if self.scene is None:
-            return False
-        edit, exported = self.scene.edit, self._ledger.exported or Edit()
-        is_same = binds_like(edit, exported) and poses_like(edit, exported)
-        return not is_same and not (edit.is_identity and exported.is_identity)
+        return self.scene is not None and self._ledger.has_unexported_edit
 
     @property
     def n_threads(self) -> int:
@@ -110,15 +106,6 @@ class Session:
     @n_threads.setter
     def n_threads(self, n_threads: int) -> None:
         self._ledger.n_threads = n_threads
-
-    @property
-    def depictor(self) -> Depictor:
-        """What prepares for the view, on the worker, what it draws."""
-        return self._ledger.depictor
-
-    @depictor.setter
-    def depictor(self, depictor: Depictor | None) -> None:
-        self._ledger.depictor = depictor or Unseen()
 
     # ------------------------------------------------------------------ files
 
@@ -208,6 +195,10 @@ class Session:
         scene = self._scene()
         if scene.preview is not None:
             scene.set_preview(None)
+
+    def prepare_for(self, depictor: Depictor | None) -> None:
+        """Have the worker prepare what a view draws of scenes and poses to come; None: there is no view."""
+        self._ledger.depictor = depictor or Unseen()
 
     def pace_frames(self, gate: Gate) -> None:
         """Hold each frame of a drag at ``gate``, until the picture has shown the one before."""

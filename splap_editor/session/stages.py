@@ -88,6 +88,13 @@ class Ledger:
         return is_far_enough and binds_like(posed.edit, edit) and poses_like(posed.edit, edit)
 
     @property
+    def has_unexported_edit(self) -> bool:
+        """Whether the edit differs from the one last exported (or from the file's own pose)."""
+        edit, exported = self.scene.edit, self.exported or Edit()
+        is_same = binds_like(edit, exported) and poses_like(edit, exported)
+        return not is_same and not (edit.is_identity and exported.is_identity)
+
+    @property
     def state_at_rest(self) -> str:
         """What to say once nothing is left to be made."""
         if not self.scene.shown_edit.active_handles:

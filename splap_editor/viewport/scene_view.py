@@ -109,7 +109,7 @@ class SceneView:
     Parameters
     ----------
     session : Session
-        Followed. Its ``depictor`` is set, so that each pose comes with drawing order and colours.
+        Followed. Its worker is told to prepare drawing order and colours along with each pose.
     viewport : Viewport
         Where it is drawn.
     """
@@ -129,7 +129,7 @@ class SceneView:
         self._view_job = LatestJob(session.view_worker, "view")
         self._seen = SeenFrom(np.zeros(3), np.array([0.0, 0.0, -1.0], np.float32), False)
         viewport.splats.view_turned = self._on_view_turned
-        session.depictor = self
+        session.prepare_for(self)
         self._follower = SceneFollower(
             session,
             self._on_scene_changed,
@@ -146,7 +146,8 @@ class SceneView:
     def close(self) -> None:
         """Let go of session and viewport."""
         self._follower.close()
-        self._session.depictor = self._scene = None
+        self._session.prepare_for(None)
+        self._scene = None
         self._view_job.drop()
         self.viewport.close()
 
