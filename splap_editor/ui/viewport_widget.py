@@ -64,6 +64,9 @@ class ViewportWidget(QtInteractor):
         self.setMinimumSize(320, 240)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setMouseTracking(True)
+        # Of the positions that come in during a slow frame Qt would pass on the last only: a lasso would lose its
+        # corners. Under X11 that is turned on when the application starts, so not before is it turned off.
+        QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_CompressHighFrequencyEvents, False)
         self._is_ready = True
 
     def connect_tools(self, pointer: PointerTaker, key: KeyTaker) -> None:
@@ -259,10 +262,8 @@ class ViewportWidget(QtInteractor):
 
 
 def ask_of_qt() -> None:
-    """Say what the window needs of OpenGL and of the mouse; to be called before the application is made."""
+    """Say what the window needs of OpenGL; to be called before the application is made."""
     QSurfaceFormat.setDefaultFormat(surface_format())
-    # Of the positions that come in during a slow frame Qt would pass on the last only: a lasso would lose its corners.
-    QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_CompressHighFrequencyEvents, False)
 
 
 def surface_format() -> QSurfaceFormat:

@@ -36,6 +36,14 @@ def own_settings(tmp_path: Path, qapp: QApplication) -> None:
     QSettings.setPath(QSettings.Format.IniFormat, QSettings.Scope.UserScope, str(tmp_path / "settings"))
 
 
+@pytest.fixture
+def quiet(capfd: pytest.CaptureFixture[str]) -> Iterator[None]:
+    """Fail a test during which anything was written to stderr, by Python or below it."""
+    capfd.readouterr()
+    yield
+    assert capfd.readouterr().err == ""
+
+
 class Driver:
     """A person in front of the window: points in logical pixels of the viewport."""
 

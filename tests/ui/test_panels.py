@@ -16,9 +16,18 @@ from splap_editor.ui.widgets.number_field import NumberField, ScrubLabel
 from splap_editor.ui.widgets.options_form import OptionsForm
 
 
-@pytest.mark.parametrize("angles", [(10.0, 20.0, 30.0), (-170.0, 80.0, 5.0), (0.0, 90.0, 0.0), (33.0, -90.0, 0.0)])
+@pytest.mark.parametrize(
+    "angles", [(10.0, 20.0, 30.0), (-170.0, 80.0, 5.0), (0.0, 90.0, 0.0), (33.0, -90.0, 0.0), (5.0, 120.0, -40.0)]
+)
 def test_euler_angles_come_back_from_their_quaternion(angles):
     np.testing.assert_allclose(euler_degrees(quat_of_euler(angles)), angles, atol=1e-6)
+
+
+def test_of_two_ways_to_tell_a_rotation_the_shorter_is_told():
+    y, z = np.array(quat_of_euler((0.0, 120.0, 0.0))), np.array(quat_of_euler((0.0, 0.0, 40.0)))
+    # First about Y, then about Z: the product of the quaternions z and y.
+    w = np.array([z[0] * y[0] - z[1:] @ y[1:], *(z[0] * y[1:] + y[0] * z[1:] + np.cross(z[1:], y[1:]))])
+    np.testing.assert_allclose(euler_degrees(w), (0.0, 120.0, 40.0), atol=1e-9)
 
 
 def test_a_pose_shown_is_not_changed_by_showing_it(qtbot):

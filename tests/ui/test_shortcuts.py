@@ -1,10 +1,11 @@
 """No key is claimed twice, and keys reach what they are for wherever the focus is."""
 
 from collections import Counter
+from time import sleep
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtCore import QCoreApplication, QPoint, QPointF, Qt
 from PySide6.QtGui import QKeySequence, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
@@ -68,6 +69,11 @@ def test_the_keyboard_starts_with_the_picture(empty_window, qtbot):
     assert QApplication.focusWidget() is empty_window.viewport
 
 
+def test_the_tools_are_told_every_position_of_the_pointer(empty_window):
+    # Qt would leave out all but the last of those that come during a frame.
+    assert not QCoreApplication.testAttribute(Qt.ApplicationAttribute.AA_CompressHighFrequencyEvents)
+
+
 @pytest.mark.parametrize("key", [Qt.Key.Key_Return, Qt.Key.Key_Escape])
 def test_return_and_escape_give_the_keyboard_back(driver, key):
     field = focused(driver, driver.window.deformer_panel.free_radius)
@@ -120,8 +126,10 @@ def values(controls):
     return [each.currentIndex() if isinstance(each, QComboBox) else each.value() for each in controls]
 
 
-def test_the_wheel_over_the_panels_changes_nothing_but_the_scroll(driver):
+@pytest.mark.parametrize("frame_s", [0.0, 0.3])
+def test_the_wheel_over_the_panels_changes_nothing_but_the_scroll(driver, quiet, frame_s):
     window, scene = driver.window, driver.scene
+    window.viewport.frame_drawn.connect(lambda _: sleep(frame_s))
     scroll = window.dock.widget()
     window.viewport.setFocus()
     page, bar = scroll.widget(), scroll.verticalScrollBar()
@@ -144,3 +152,17 @@ def test_the_wheel_turns_a_choice_that_has_the_focus(driver):
     assert wheel_taker(method) is method
     assert method.currentIndex() == 1
     driver.wait_idle()
+
+
+def test_home_after_undo_frames_what_undo_brings_back(driver):
+    driver.click(driver.surface_pixel())
+    driver.wait_idle()
+    for key in (Qt.Key.Key_G, Qt.Key.Key_X, Qt.Key.Key_5, Qt.Key.Key_Return):
+        driver.key(key)
+    driver.wait_idle()
+    driver.key(Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    driver.key(Qt.Key.Key_Home)
+    driver.wait_idle()
+    viewport = driver.window.view.viewport
+    driver.qtbot.waitUntil(lambda: not viewport.is_moving)
+    assert viewport.camera.view.is_near(viewport.frame())

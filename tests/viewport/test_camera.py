@@ -13,6 +13,7 @@ from splap_editor.viewport.camera import (
     framed,
     orbited,
     panned,
+    scene_axes,
     turn,
     zoomed,
 )
@@ -187,3 +188,17 @@ def test_clipping_holds_the_box_and_never_goes_behind_the_eye(camera):
     camera.fit_clipping(box)
     near, far = camera.vtk.GetClippingRange()
     assert 0.0 < near < 1e-3 * far
+
+
+@pytest.mark.parametrize("up", [(0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (1.0, 0.0, 0.0)])
+def test_axes_of_a_scene_are_right_handed_and_stand_along_its_up(up):
+    axes = scene_axes(up)
+    np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(axes) == pytest.approx(1.0)
+    np.testing.assert_allclose(axes[2], up)
+
+
+def test_the_front_of_a_scene_that_stands_along_z_is_seen_along_y():
+    np.testing.assert_allclose(scene_axes((0.0, 0.0, 1.0))[1], (0.0, 1.0, 0.0))
+    # A capture with Y down was seen along Z by its cameras.
+    np.testing.assert_allclose(scene_axes((0.0, -1.0, 0.0))[1], (0.0, 0.0, 1.0))
