@@ -6,7 +6,7 @@ from PySide6.QtWidgets import QMessageBox, QWidget
 
 import splap_editor
 from splap_editor.ui.actions.actions import ActionSet
-from splap_editor.ui.dialogs.command_palette import CommandPalette
+from splap_editor.ui.dialogs.action_palette import ActionPalette
 from splap_editor.ui.dialogs.help_sheet import HelpSheet
 from splap_editor.ui.dialogs.preferences_dialog import PreferencesDialog
 from splap_editor.ui.preferences import PreferenceStore
@@ -30,7 +30,7 @@ class ProgramActions:
 
     def palette(self) -> None:
         """Find an action by name."""
-        CommandPalette(self.actions, self._window).open()
+        ActionPalette(self.actions, self._window).open()
 
     def preferences(self) -> None:
         """Change what is kept between runs."""

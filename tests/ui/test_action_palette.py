@@ -5,7 +5,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
 from splap_editor.ui.actions.action_table import ACTIONS
-from splap_editor.ui.dialogs.command_palette import ENABLED, KEYS, CommandPalette, ranked, recent_actions
+from splap_editor.ui.dialogs.action_palette import ENABLED, KEYS, ActionPalette, ranked, recent_actions
 from splap_editor.ui.dialogs.fuzzy import fuzzy_score
 
 CTRL_SHIFT = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier
@@ -39,7 +39,7 @@ def test_recent_actions_come_first_among_equals():
 
 def palette(driver):
     driver.key(Qt.Key.Key_P, CTRL_SHIFT)
-    found = driver.window.findChildren(CommandPalette)
+    found = driver.window.findChildren(ActionPalette)
     assert len(found) == 1 and found[0].isVisible()
     return found[0]
 
@@ -52,11 +52,11 @@ def test_typing_and_enter_run_an_action_which_is_recent_from_then_on(driver):
     QTest.keyClick(shown.field, Qt.Key.Key_Return)
     assert driver.scene.selection.all()
     assert recent_actions() == ["select.all"]
-    driver.qtbot.waitUntil(lambda: not driver.window.findChildren(CommandPalette))
+    driver.qtbot.waitUntil(lambda: not driver.window.findChildren(ActionPalette))
     again = palette(driver)
     assert again.found[0] == "select.all"
     QTest.keyClick(again.field, Qt.Key.Key_Escape)
-    driver.qtbot.waitUntil(lambda: not driver.window.findChildren(CommandPalette))
+    driver.qtbot.waitUntil(lambda: not driver.window.findChildren(ActionPalette))
 
 
 def test_what_cannot_be_done_is_grey_and_does_nothing(driver):

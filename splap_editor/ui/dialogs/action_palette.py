@@ -49,7 +49,7 @@ def ranked(query: str, texts: Sequence[tuple[str, str]], recent: Sequence[str]) 
     return [action_id for *_, action_id in sorted(found)]
 
 
-class CommandPalette(QDialog):
+class ActionPalette(QDialog):
     """A line to type in and the actions it finds; Enter runs the marked one, Escape leaves.
 
     Parameters
