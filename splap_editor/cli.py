@@ -117,7 +117,7 @@ def _add_options(parser: argparse.ArgumentParser, group: type, names: Sequence[s
             parser.add_argument(
                 f"--{name.replace('_', '-')}",
                 type=type(known.default),
-                choices=known.choices and tuple(known.choices),
+                choices=tuple(known.choices) or None,
                 default=known.default,
                 help=f"{known.sentence[0].lower()}{known.sentence[1:].rstrip('.')}; default {known.default}",
             )
@@ -154,13 +154,13 @@ def _render(options: argparse.Namespace) -> int:
 
 
 def _deform(options: argparse.Namespace) -> int:
-    from splap_editor.core.adaptation.kernel_adaptation import adapted_splats
+    from splap_editor.engine.bound_edit import posed
     from splap_editor.engine.cache import StageCache
-    from splap_editor.engine.export_report import export_report
-    from splap_editor.engine.pipeline import deformer_of, handles_of, kernels_of, surface_of
-    from splap_editor.engine.quantities import Snapshot, column_names, columns_of
+    from splap_editor.engine.quantities import column_names
+    from splap_editor.engine.scripting import write_posed
     from splap_editor.frames_cli import deform_frames, edit_for, read_edit_file
-    from splap_editor.io.ply import read_ply, write_ply
+    from splap_editor.io.ply import read_ply
+    from splap_editor.session.side_by_side import side_by_side
 
     if options.frames is not None:
         return deform_frames(options)
@@ -172,49 +172,23 @@ def _deform(options: argparse.Namespace) -> int:
     for warning in file.warnings:
         report.say(f"note: {warning}")
     edit = edit_for(held, file, report.say)
-    kernels = handles = deformer = deformation = surface = None
-    if edit.active_handles or columns:
-        cache = None if options.no_cache else StageCache(say=lambda text: report.say(f"note: {text}"))
-        surface = surface_of(file.splats, edit.graph, cache=cache, stages=report.stage)
-        report.end_stage()
-    if edit.active_handles:
-        with report("bind"):
-            handles = handles_of(surface, edit)
-            deformer = deformer_of(surface, edit, handles, cache=cache, progress=report.progress)
-        with report("solve"):
-            deformation = deformer.solve(edit.transforms, progress=report.progress)
-        with report("adapt"):
-            kernels = kernels_of(surface, edit, deformation)
-    with report("colour"):
-        splats = file.splats if kernels is None else adapted_splats(file.splats, kernels)
-    with report("write"):
-        extra = {}
-        if columns:
-            weights = getattr(deformer, "weights", None)
-            handle = 0 if len(edit.active_handles) == 1 else None
-            extra = columns_of(
-                columns, Snapshot(file.splats, surface.ellipses, surface, kernels, handles, weights, handle)
-            )
-        write_ply(options.output, file, splats, as_3dgs=options.as_3dgs, extra=extra)
-    summary = export_report(options.output, file.splats, kernels)
-    if options.json:
-        print(
-            json.dumps(
-                {
-                    "output": str(options.output),
-                    "n_splats": summary.n_splats,
-                    "n_changed": summary.n_changed,
-                    "largest_displacement": summary.largest_displacement,
-                    "largest_stretch": summary.largest_stretch,
-                    "residual": _known(deformation.residual) if deformation is not None else 0.0,
-                    "n_iterations": deformation.n_iterations if deformation is not None else 0,
-                    "warnings": file.warnings,
-                    "timings_s": report.timings_s,
-                }
-            )
-        )
-    else:
+    cache = None if options.no_cache else StageCache(say=lambda text: report.say(f"note: {text}"))
+    made = posed(file, edit, cache=cache, stages=report.stage, run=side_by_side(), with_surface=bool(columns))
+    summary = write_posed(options.output, file, made, columns=columns, as_3dgs=options.as_3dgs, stages=report.stage)
+    report.end_stage()
+    deformation = made.deformation
+    if not options.json:
         report.say(str(summary))
+        return EXIT_OK
+    told = {
+        **vars(summary),
+        "output": str(options.output),
+        "residual": _known(deformation.residual) if deformation is not None else 0.0,
+        "n_iterations": deformation.n_iterations if deformation is not None else 0,
+        "warnings": file.warnings,
+        "timings_s": report.timings_s,
+    }
+    print(json.dumps({name: value for name, value in told.items() if name != "path"}))
     return EXIT_OK
 
 
@@ -228,7 +202,7 @@ def _info(options: argparse.Namespace) -> int:
     with report("occupancy"):
         info, ellipses = scene_info(file)
     if options.graph:
-        from splap_editor.engine.pipeline import surface_of
+        from splap_editor.engine.surface import surface_of
 
         surface = surface_of(file.splats, GraphOptions(), ellipses=ellipses, stages=report.stage)
         report.end_stage()

@@ -111,8 +111,9 @@ def _prepared(
 ) -> tuple["SplatFile", "FramePoser"]:
     from splap_editor.engine.cache import StageCache
     from splap_editor.engine.frames import frame_poser
-    from splap_editor.engine.pipeline import surface_of
+    from splap_editor.engine.surface import surface_of
     from splap_editor.io.ply import read_ply
+    from splap_editor.session.side_by_side import side_by_side
 
     layout = options.layout or (held.ply.layout if isinstance(held, SessionFile) else None)
     with report("read"):
@@ -126,7 +127,7 @@ def _prepared(
         surface = surface_of(file.splats, edit.graph, cache=cache, stages=report.stage)
         report.end_stage()
     with report("bind"):
-        return file, frame_poser(surface, edit, cache=cache, progress=report.progress)
+        return file, frame_poser(surface, edit, cache=cache, progress=report.progress, run=side_by_side())
 
 
 def _studio(

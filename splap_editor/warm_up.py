@@ -13,14 +13,17 @@ import numpy as np
 
 import splap_editor
 from splap_editor.core.adaptation.kernel_adaptation import adapted_splats
-from splap_editor.core.graph.splat_graph import GraphOptions
+from splap_editor.core.deformers import method_titles
+from splap_editor.core.graph.options import GraphOptions
 from splap_editor.core.handle_nodes import Region
-from splap_editor.core.progress import no_progress
+from splap_editor.core.options import OptionSet
+from splap_editor.core.reach_options import ReachOptions
 from splap_editor.core.splats.spherical_harmonics import view_colors
 from splap_editor.core.splats.splats import Splats
+from splap_editor.engine.bound_edit import bind, ready_for_drags
 from splap_editor.engine.cache import default_cache_folder
 from splap_editor.engine.edit import Edit, Handle, Pose
-from splap_editor.engine.pipeline import deformer_of, handles_of, kernels_of, surface_of
+from splap_editor.engine.surface import surface_of
 
 PARTS = ("view", "engine")
 """What is compiled side by side; the first is enough to show a scene."""
@@ -43,17 +46,17 @@ def _warm_engine() -> None:
     splats = _sheet()
     surface = surface_of(splats, GraphOptions())
     surface_of(splats, GraphOptions(rule="paper"))
-    _ = surface.arap_scene.coarse
-    center = surface.ellipses.centers[0]
+    ready_for_drags(surface)
+    center = surface.rest[0]
     handles = (Handle(1, "", "#ffffff", Region(center, 0.1), Pose((0.0, 0.0, 0.3), (0.9, 0.1, 0.2, 0.3))),)
-    pins = (Region(surface.ellipses.centers[-1], 0.1),)
-    for method in ("arap", "bbw"):
-        edit = Edit(handles, pins, method, free_radius=None)
-        deformer = deformer_of(surface, edit, handles_of(surface, edit), progress=no_progress)
-        deformer.drag(edit.transforms)
-        kernels = kernels_of(surface, edit, deformer.solve(edit.transforms))
+    pins = (Region(surface.rest[-1], 0.1),)
+    for method in method_titles():
+        edit = Edit(handles, pins, method, OptionSet(ReachOptions(None)))
+        bound = bind(surface, edit)
+        bound.drag(edit)
+        kernels = bound.pose().kernels
         # A drag that goes on from a settled pose takes another path.
-        deformer.drag(edit.transforms)
+        bound.drag(edit)
     adapted_splats(splats, kernels)
 
 

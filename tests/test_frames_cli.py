@@ -9,6 +9,9 @@ import pytest
 from PIL import Image
 
 from splap_editor.cli import main
+from splap_editor.core.options import OptionSet
+from splap_editor.core.pose import Pose
+from splap_editor.core.reach_options import ReachOptions
 from splap_editor.io.ply import read_ply
 from splap_editor.io.recipe import HandleSpec, Recipe, write_recipe
 from splap_editor.io.session_file import write_session_file
@@ -16,7 +19,6 @@ from splap_editor.io.session_specs import (
     HandleSettings,
     KeySpec,
     PlySpec,
-    PoseSpec,
     SessionFile,
     TimelineSpec,
     ViewSpec,
@@ -38,12 +40,14 @@ def session(tmp_path, ply):
     splats = read_ply(ply).splats
     means = np.asarray(splats.means, np.float64)
     end = tuple(means[np.argmax(means[:, 2])].tolist())
-    lifted = PoseSpec((0.3, 0.0, 0.0))
+    lifted = Pose((0.3, 0.0, 0.0))
     held = SessionFile(
         PlySpec("tube.ply", "", splats.n_splats),
-        Recipe(free_radius=None, handles=(HandleSpec("end", end, 0.15, translate=(0.3, 0.0, 0.0)),)),
+        Recipe(
+            options=OptionSet(ReachOptions(None)), handles=(HandleSpec("end", end, 0.15, translate=(0.3, 0.0, 0.0)),)
+        ),
         (HandleSettings(4, "#ffffff"),),
-        timeline=TimelineSpec((KeySpec(1, {4: PoseSpec()}), KeySpec(3, {4: lifted})), 3, 3),
+        timeline=TimelineSpec((KeySpec(1, {4: Pose()}), KeySpec(3, {4: lifted})), 3, 3),
         view=ViewSpec((0.0, -6.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
         display={"mode": "ellipses", "background": "black"},
     )

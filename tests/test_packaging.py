@@ -25,7 +25,7 @@ def test_the_wheel_carries_the_resources_where_the_program_looks_for_them():
     wheel = PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]
     assert wheel["packages"] == ["splap_editor"]
     # The pictures of the README stay out of the wheel.
-    names = ("icons", "samples", "shaders", "system-packages.txt")
+    names = ("icons", "samples", "schemas", "shaders", "system-packages.txt")
     assert wheel["force-include"] == {f"resources/{name}": f"splap_editor/_resources/{name}" for name in names}
 
 
@@ -84,9 +84,27 @@ def test_the_layer_contract_names_every_layer_from_top_to_bottom():
 
 
 def test_the_package_itself_imports_nothing_that_takes_time():
-    tree = ast.parse(Path(splap_editor.__file__).read_text(encoding="utf-8"))
-    imports = [ast.unparse(node) for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)]
-    assert imports == ["import os"]
+    script = "import sys; before = set(sys.modules); import splap_editor; print(*set(sys.modules) - before)"
+    listed = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert set(listed.split()) == {"splap_editor"}
+
+
+def test_scripts_get_the_names_they_are_promised():
+    for name in splap_editor.__all__:
+        assert getattr(splap_editor, name) is not None
+        assert name in dir(splap_editor)
+    named = ast.parse(Path(splap_editor.__file__).read_text(encoding="utf-8"))
+    typed = {
+        alias.asname or alias.name: f"{node.module}:{alias.name}"
+        for node in ast.walk(named)
+        if isinstance(node, ast.ImportFrom) and node.module.startswith("splap_editor")
+        for alias in node.names
+    }
+    places = splap_editor._PLACES
+    lazy = {name: f"splap_editor.{place}" + ("" if ":" in place else f":{name}") for name, place in places.items()}
+    assert typed == lazy and sorted(typed) == sorted(splap_editor.__all__)
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        splap_editor.nothing  # noqa: B018
 
 
 def test_nothing_but_the_agreed_names_lies_at_the_top():

@@ -9,6 +9,12 @@ from numpy.typing import NDArray
 
 from splap_editor.core.progress import Progress, no_progress
 
+PIN = -1
+"""Label of a node that stays where it is."""
+
+FREE = -2
+"""Label of a node that nothing holds."""
+
 
 class UnconstrainedComponentError(ValueError):
     """A handle set that leaves a deformer nothing to hold on to; the message says what the user can do."""
@@ -25,7 +31,7 @@ class Handles:
     indices : (C,) int64
         Constrained nodes, ascending, each once.
     labels : (C,) int32
-        Handle that moves the node, 0 to H - 1; -1 for a pin, which stays put.
+        Handle that moves the node, 0 to H - 1; `PIN` for one that stays put.
     centers : (H, 3) float64
         Point about which each handle's pose turns, in world units.
     cage_radii : (H,) float64

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from splap_editor.core.deformer import Handles
+from splap_editor.core.deformer import FREE, PIN, Handles
 from splap_editor.core.index_spaces import FileRows, Nodes
 from splap_editor.core.splats.occupancy import Ellipses
 
@@ -76,18 +76,17 @@ def handle_nodes(
     if cages.shape != (len(handles),):
         raise ValueError(f"cage_radii must have shape ({len(handles)},), got {cages.shape}")
     tree = cKDTree(ellipses.centers)
-    free, pinned = -2, -1
-    labels = np.full(ellipses.n_nodes, free, np.int32)
+    labels = np.full(ellipses.n_nodes, FREE, np.int32)
     for pin in pins:
-        labels[_nodes_in(pin, ellipses, tree)] = pinned
+        labels[_nodes_in(pin, ellipses, tree)] = PIN
     for label in range(len(handles) - 1, -1, -1):
         labels[_nodes_in(handles[label], ellipses, tree)] = label
     if free_radius is not None and (labels >= 0).any():
         moved = cKDTree(ellipses.centers[labels >= 0])
-        others = np.flatnonzero(labels == free)
+        others = np.flatnonzero(labels == FREE)
         distances, _ = moved.query(ellipses.centers[others], distance_upper_bound=np.nextafter(free_radius, np.inf))
-        labels[others[~np.isfinite(distances)]] = pinned
-    indices = np.flatnonzero(labels != free)
+        labels[others[~np.isfinite(distances)]] = PIN
+    indices = np.flatnonzero(labels != FREE)
     centers = np.array([handle.center for handle in handles], np.float64).reshape(len(handles), 3)
     return Handles(indices=indices, labels=labels[indices], centers=centers, cage_radii=cages)
 

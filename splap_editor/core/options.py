@@ -5,11 +5,13 @@ flags of the command line and forms in the window are all made from it.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from importlib import import_module
 from numbers import Integral, Real
-from typing import Any
+from typing import Any, TypeVar
+
+Group = TypeVar("Group")
 
 _KEY = "option"
 
@@ -76,7 +78,8 @@ class Option:
         In front of its field in a form.
     above, least, most : float
         Bounds of a number: greater than, at least, at most.
-    choices : mapping of str to Choice, optional
+    choices : mapping of str to Choice
+        Empty where it is no choice.
     unit : str
         ``"world"``: the file's units; ``"of s"``: units of the scene's size; ``"px"``: pixels of the
         screen; empty for a bare number.
@@ -86,6 +89,8 @@ class Option:
         Of the number in a form.
     only_for : (str, tuple), optional
         Name and values of another option of the group without which this one means nothing.
+    is_always_written : bool
+        A recipe says it even where it is at its default.
     default : object
         Filled in by `options_of`.
     """
@@ -95,18 +100,19 @@ class Option:
     above: float = -math.inf
     least: float = -math.inf
     most: float = math.inf
-    choices: Mapping[str, Choice] | None = None
+    choices: Mapping[str, Choice] = field(default_factory=dict)
     unit: str = ""
     is_percent: bool = False
     step: float = 1.0
     decimals: int = 3
     only_for: tuple[str, tuple[str, ...]] | None = None
+    is_always_written: bool = False
     default: Any = None
 
     @property
     def kind(self) -> str:
         """``"choice"``, ``"flag"``, ``"integer"``, ``"number"``, ``"length"`` or ``"pairs"``."""
-        if self.choices is not None:
+        if self.choices:
             return "choice"
         kinds = ((bool, "flag"), (int, "integer"), (float, "number"), (ShareOfSize, "length"), (tuple, "pairs"))
         return next(kind for held, kind in kinds if isinstance(self.default, held))
@@ -153,6 +159,56 @@ def option(default: Any, sentence: str, **known: Any) -> Any:
 def options_of(group: Any) -> dict[str, Option]:
     """Options of a group, or of its class, by name in their order."""
     return {each.name: each.metadata[_KEY] for each in fields(group) if _KEY in each.metadata}
+
+
+def default_of(group: type, name: str) -> Any:
+    """Default of one option of a group."""
+    return options_of(group)[name].default
+
+
+_USUAL: dict[type, Any] = {}
+
+
+def _usual(kind: type[Group]) -> Group:
+    """Group with every option at its default."""
+    if kind not in _USUAL:
+        _USUAL[kind] = kind()
+    usual: Group = _USUAL[kind]
+    return usual
+
+
+class OptionSet:
+    """Option groups, one of a class at most, as one immutable value; a class that is not in it is at its defaults.
+
+    Parameters
+    ----------
+    *groups
+        The later of two of a class counts.
+    """
+
+    def __init__(self, *groups: Any) -> None:
+        held = {type(group): group for group in groups}
+        self._held = {kind: group for kind, group in held.items() if group != _usual(kind)}
+
+    def __getitem__(self, kind: type[Group]) -> Group:
+        group: Group = self._held.get(kind, _usual(kind))
+        return group
+
+    def __iter__(self) -> Iterator[Any]:
+        return iter(self._held.values())
+
+    def with_groups(self, *groups: Any) -> "OptionSet":
+        """Replace some groups."""
+        return OptionSet(*self._held.values(), *groups)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, OptionSet) and self._held == other._held
+
+    def __hash__(self) -> int:
+        return hash(frozenset(self._held.values()))
+
+    def __repr__(self) -> str:
+        return f"OptionSet({', '.join(map(repr, self._held.values()))})"
 
 
 def check_options(group: Any) -> None:

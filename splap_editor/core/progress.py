@@ -1,6 +1,9 @@
 """How a long function tells how far it is, and how it is cancelled."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import Protocol, TypeVar
+
+Result = TypeVar("Result")
 
 Progress = Callable[[float], None]
 """Called with the share done, 0 to 1, at most about ten times a second; raises `Cancelled` to stop the caller."""
@@ -17,3 +20,40 @@ def no_progress(share: float) -> None:
 def part_of(progress: Progress, start: float, end: float) -> Progress:
     """Map a sub-step's own share 0..1 to the slice ``start``..``end`` of its caller's progress."""
     return lambda share: progress(start + (end - start) * share)
+
+
+StageProgress = Callable[[str], Progress]
+"""Gives the progress callback of a stage, by its name or by words for it."""
+
+
+def silent(stage: str) -> Progress:
+    """Report no stage."""
+    return no_progress
+
+
+class Runner(Protocol):
+    """Runs parts that do not depend on each other, as it likes: one after the other, or side by side."""
+
+    def __call__(
+        self, parts: Sequence[Callable[[Progress], Result]], told: Callable[[Sequence[float]], None]
+    ) -> list[Result]:
+        """Give the results in order; ``told`` hears the shares done of all parts, and cancels all by raising."""
+        ...
+
+
+def in_turn(parts: Sequence[Callable[[Progress], Result]], told: Callable[[Sequence[float]], None]) -> list[Result]:
+    """Run parts one after the other."""
+    shares = [0.0] * len(parts)
+
+    def progress_of(number: int) -> Progress:
+        def progress(share: float) -> None:
+            shares[number] = share
+            told(shares)
+
+        return progress
+
+    results = []
+    for number, part in enumerate(parts):
+        results.append(part(progress_of(number)))
+        shares[number] = 1.0
+    return results

@@ -5,7 +5,6 @@ import hashlib
 import os
 import struct
 import tempfile
-import threading
 import zlib
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -13,21 +12,16 @@ from typing import BinaryIO, TypeVar
 
 import numpy as np
 import platformdirs
-from numpy.typing import NDArray
 
+from splap_editor.core.kept_arrays import Arrays, CacheEntryError
 from splap_editor.io.npz import NpzError, NpzFile
 from splap_editor.io.regular_file import open_regular
 
-Arrays = dict[str, NDArray]
 T = TypeVar("T")
 
 _HEAD = struct.Struct("<16sQI")
 _MAGIC = b"SpLap cache 2\r\n\0"
 _CHUNK = 1 << 20
-
-
-class CacheEntryError(ValueError):
-    """An entry whose arrays are not what they should be."""
 
 
 class StageCache:
@@ -58,7 +52,8 @@ class StageCache:
         self.folder = folder or default_cache_folder() / "scenes"
         self.max_bytes = max_bytes
         self.say = say
-        self._said = threading.Lock()
+        # Taking the one item is atomic, so that of two threads one says it.
+        self._unsaid = [True]
 
     def load(self, key: str, made: Callable[[Arrays], T]) -> T | None:
         """Make something of the arrays kept under ``key``; None where there are none.
@@ -86,8 +81,10 @@ class StageCache:
         """Remove an entry, and say so the first time."""
         with contextlib.suppress(OSError):
             path.unlink(missing_ok=True)
-        if self.say is not None and not isinstance(error, _EarlierFormatError) and self._said.acquire(blocking=False):
-            self.say(f"A prepared scene in {self.folder} was damaged: it is made again.")
+        if self.say is not None and not isinstance(error, _EarlierFormatError):
+            with contextlib.suppress(IndexError):
+                self._unsaid.pop()
+                self.say(f"A prepared scene in {self.folder} was damaged: it is made again.")
 
     def store(self, key: str, arrays: Arrays) -> bool:
         """Keep arrays under ``key``; False when the disk did not take them."""
@@ -173,60 +170,6 @@ def _length_and_sum(file: BinaryIO) -> tuple[int, int]:
         n_bytes += len(chunk)
         total = zlib.crc32(chunk, total)
     return n_bytes, total
-
-
-def require_rows(kept: Arrays, name: str, n_rows: int, n_columns: int) -> None:
-    """Check compressed sparse rows ``name_indptr`` and ``name_indices`` before compiled loops follow them.
-
-    Raises
-    ------
-    CacheEntryError
-        If they are not ``n_rows`` rows of columns 0 to ``n_columns - 1``.
-    """
-    indptr, indices = kept[f"{name}_indptr"], kept[f"{name}_indices"]
-    require_array(indptr, f"{name}_indptr", (n_rows + 1,), np.int32)
-    require_array(indices, f"{name}_indices", (None,), np.int32, (0, n_columns))
-    if indptr[0] != 0 or indptr[-1] != len(indices) or (np.diff(indptr) < 0).any():
-        raise CacheEntryError(f"{name}_indptr does not part {name}_indices into rows")
-
-
-def require_array(
-    array: NDArray,
-    name: str,
-    shape: tuple[int | None, ...],
-    dtype: type[np.generic],
-    span: tuple[int, int] | None = None,
-) -> None:
-    """Check shape, type and values of an array from the cache.
-
-    Parameters
-    ----------
-    array : array
-    name : str
-        What to call it.
-    shape : tuple of int or None
-        None for any number.
-    dtype : type
-        Its type, to the bit.
-    span : (int, int), optional
-        Least value and the first that is too large; without it all must be finite.
-
-    Raises
-    ------
-    CacheEntryError
-        If it is not so.
-    """
-    fits = array.ndim == len(shape) and all(
-        want is None or want == got for want, got in zip(shape, array.shape, strict=True)
-    )
-    if not fits or array.dtype != dtype:
-        raise CacheEntryError(f"{name} has shape {array.shape} and type {array.dtype}")
-    if span is None:
-        is_fine = bool(np.isfinite(array).all())
-    else:
-        is_fine = not array.size or (array.min() >= span[0] and array.max() < span[1])
-    if not is_fine:
-        raise CacheEntryError(f"{name} has values out of range")
 
 
 def default_cache_folder() -> Path:

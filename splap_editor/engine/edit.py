@@ -6,11 +6,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.graph.splat_graph import GraphOptions
+from splap_editor.core.adaptation.options import AdaptationOptions
+from splap_editor.core.deformers import DeformerRow, deformer_row
+from splap_editor.core.graph.options import GraphOptions
 from splap_editor.core.handle_nodes import Region
-from splap_editor.engine.pose import Pose
+from splap_editor.core.options import Length, OptionSet
+from splap_editor.core.pose import Pose
+from splap_editor.core.reach_options import CageOptions
 from splap_editor.engine.timeline import Timeline
-from splap_editor.io.recipe import SolverSpec
 
 HANDLE_COLORS = ("#f2a93b", "#4fb3ff", "#7bd66b", "#e66fb0", "#b18cff", "#ff7a59", "#49d3c2", "#d9d24a")
 """Handle colours in the order they are given out; told apart by the colour-blind too when neighbours in the list."""
@@ -32,8 +35,8 @@ class Handle:
         About the region's centre.
     enabled : bool
         A disabled handle neither moves nor holds anything and is not in the recipe.
-    cage_radius : float or None
-        Reach of the handle's bounded biharmonic weight in world units; None for the whole object, NaN for the default.
+    cage_radius : float, ShareOfSize or None
+        Reach of the handle's weight, see `CageOptions`.
     """
 
     handle_id: int
@@ -42,7 +45,7 @@ class Handle:
     region: Region
     pose: Pose = field(default_factory=Pose)
     enabled: bool = True
-    cage_radius: float | None = float("nan")
+    cage_radius: Length = CageOptions.cage_radius
 
     @property
     def transform(self) -> NDArray[np.float64]:
@@ -60,17 +63,9 @@ class Edit:
     pins : tuple of Region
         Splats that stay put.
     method : str
-        ``"arap"`` or ``"bbw"``.
-    graph : GraphOptions
-    free_radius : float or None or NaN
-        World units; None frees everything that is not pinned, NaN is the default of half the scene scale.
-    solver : SolverSpec
-    adaptation : str
-        ``"surface"``, ``"affine"`` or ``"none"``.
-    hops : int
-        Neighbourhood of the affine adaptation.
-    blending : str
-        ``"dual-quaternion"`` or ``"linear"``, for bounded biharmonic weights.
+        One of those in `DEFORMERS`.
+    options : OptionSet
+        `GraphOptions`, `ReachOptions`, `AdaptationOptions`, and those of every deformer.
     timeline : Timeline
         Poses at other frames than the one shown.
     """
@@ -78,13 +73,22 @@ class Edit:
     handles: tuple[Handle, ...] = ()
     pins: tuple[Region, ...] = ()
     method: str = "arap"
-    graph: GraphOptions = field(default_factory=GraphOptions)
-    free_radius: float | None = float("nan")
-    solver: SolverSpec = field(default_factory=SolverSpec)
-    adaptation: str = "surface"
-    hops: int = 1
-    blending: str = "dual-quaternion"
+    options: OptionSet = OptionSet()
     timeline: Timeline = field(default_factory=Timeline)
+
+    @property
+    def graph(self) -> GraphOptions:
+        """What the scene's surface is made by."""
+        return self.options[GraphOptions]
+
+    @property
+    def deformer(self) -> DeformerRow:
+        """What is known of the deformer that is named."""
+        return deformer_row(self.method, self.options)
+
+    def with_options(self, *groups: object) -> "Edit":
+        """Replace some option groups."""
+        return replace(self, options=self.options.with_groups(*groups))
 
     @property
     def active_handles(self) -> tuple[Handle, ...]:
@@ -136,19 +140,17 @@ class Edit:
 
 def binds_like(a: Edit, b: Edit) -> bool:
     """Whether a deformer bound for one edit serves the other: same regions, pins and options it uses, any pose."""
-    if (a.method, a.graph) != (b.method, b.graph) or len(a.pins) != len(b.pins):
+    row = a.deformer
+    if row != b.deformer or a.graph != b.graph or len(a.pins) != len(b.pins):
         return False
-    has_cages = a.method == "bbw"
-    if has_cages and a.blending != b.blending:
-        return False
-    if not has_cages and (a.solver != b.solver or not _same_number(a.free_radius, b.free_radius)):
+    if any(a.options[group] != b.options[group] for group in row.bound_by):
         return False
     left, right = a.active_handles, b.active_handles
     return (
         len(left) == len(right)
         and all(x is y for x, y in zip(a.pins, b.pins, strict=True))
         and all(
-            x.region is y.region and (not has_cages or _same_number(x.cage_radius, y.cage_radius))
+            x.region is y.region and (not row.has_weights or x.cage_radius == y.cage_radius)
             for x, y in zip(left, right, strict=True)
         )
     )
@@ -156,10 +158,6 @@ def binds_like(a: Edit, b: Edit) -> bool:
 
 def poses_like(a: Edit, b: Edit) -> bool:
     """Whether two edits that bind alike also give the same kernels."""
-    return (a.adaptation, a.hops) == (b.adaptation, b.hops) and [h.pose for h in a.active_handles] == [
+    return a.options[AdaptationOptions] == b.options[AdaptationOptions] and [h.pose for h in a.active_handles] == [
         h.pose for h in b.active_handles
     ]
-
-
-def _same_number(a: float | None, b: float | None) -> bool:
-    return a == b or (a is not None and b is not None and np.isnan(a) and np.isnan(b))

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels, adapted_splats
-from splap_editor.core.deformer import Deformer
-from splap_editor.core.progress import Progress, no_progress
+from splap_editor.core.progress import Progress, Runner, in_turn, no_progress
+from splap_editor.engine.bound_edit import BoundEdit, bind
 from splap_editor.engine.cache import StageCache
 from splap_editor.engine.edit import Edit
 from splap_editor.engine.keyframes import edit_at_frame
-from splap_editor.engine.pipeline import Surface, deformer_of, handles_of, kernels_of
+from splap_editor.engine.surface import Surface
 from splap_editor.engine.timeline import LAST_FRAME
 from splap_editor.io.ply import SplatFile, write_ply
 
@@ -21,34 +21,34 @@ class FramePoser:
 
     Parameters
     ----------
-    surface : Surface or None
-        None where no handle is enabled.
     edit : Edit
-    deformer : Deformer or None
+    bound : BoundEdit or None
         Bound for the edit; None where no handle is enabled.
     """
 
-    surface: Surface | None
     edit: Edit
-    deformer: Deformer | None
+    bound: BoundEdit | None
 
     def kernels(self, frame: int | None, *, progress: Progress = no_progress) -> AdaptedKernels | None:
         """Adapted kernels at a frame, or of the poses that the edit itself holds; None without a handle."""
-        if self.deformer is None:
+        if self.bound is None:
             return None
-        posed = self.edit if frame is None else edit_at_frame(self.edit, frame)
-        return kernels_of(self.surface, posed, self.deformer.solve(posed.transforms, progress=progress))
+        edit = self.edit if frame is None else edit_at_frame(self.edit, frame)
+        return self.bound.pose(edit, progress=progress).kernels
 
 
 def frame_poser(
-    surface: Surface | None, edit: Edit, *, cache: StageCache | None = None, progress: Progress = no_progress
+    surface: Surface | None,
+    edit: Edit,
+    *,
+    cache: StageCache | None = None,
+    progress: Progress = no_progress,
+    run: Runner = in_turn,
 ) -> FramePoser:
     """Bind the deformer of an edit; ``surface`` is needed where it has an enabled handle."""
     if not edit.active_handles:
-        return FramePoser(None, edit, None)
-    return FramePoser(
-        surface, edit, deformer_of(surface, edit, handles_of(surface, edit), cache=cache, progress=progress)
-    )
+        return FramePoser(edit, None)
+    return FramePoser(edit, bind(surface, edit, cache=cache, progress=progress, run=run))
 
 
 def frame_range(text: str, n_frames: int) -> range:

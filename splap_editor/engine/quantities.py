@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     # Those bring the compiler with them, which the command line shall not wait for to list its columns.
     from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
     from splap_editor.core.deformer import Handles
-    from splap_editor.engine.pipeline import Surface
+    from splap_editor.engine.surface import Surface
 
 
 @dataclass(frozen=True, eq=False)

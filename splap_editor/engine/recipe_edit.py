@@ -4,22 +4,17 @@ import numpy as np
 
 from splap_editor.core.handle_nodes import Region
 from splap_editor.core.splats.splats import Splats
-from splap_editor.engine.edit import HANDLE_COLORS, Edit, Handle, Pose
+from splap_editor.engine.edit import HANDLE_COLORS, Edit, Handle
 from splap_editor.io.recipe import HandleSpec, PinSpec, Recipe, RecipeError
 
 
 def recipe_of(edit: Edit, *, with_disabled: bool = False) -> Recipe:
     """Write an edit as a recipe; disabled handles are left out unless wanted, since they do nothing."""
     return Recipe(
-        method=edit.method,
-        graph=edit.graph,
-        free_radius=edit.free_radius,
         handles=tuple(_handle_spec(handle) for handle in (edit.handles if with_disabled else edit.active_handles)),
         pins=tuple(PinSpec(*_place(pin)) for pin in edit.pins),
-        solver=edit.solver,
-        adaptation=edit.adaptation,
-        hops=edit.hops,
-        blending=edit.blending,
+        method=edit.method,
+        options=edit.options,
     )
 
 
@@ -39,7 +34,7 @@ def edit_of(recipe: Recipe, splats: Splats) -> Edit:
             spec.name,
             HANDLE_COLORS[(number - 1) % len(HANDLE_COLORS)],
             _region(spec, splats, f"handle {spec.name!r}"),
-            Pose(spec.translate, spec.rotate, spec.scale),
+            spec.pose,
             cage_radius=spec.cage_radius,
         )
         for number, spec in enumerate(recipe.handles, start=1)
@@ -48,12 +43,7 @@ def edit_of(recipe: Recipe, splats: Splats) -> Edit:
         handles=handles,
         pins=tuple(_region(spec, splats, f"pin {number}") for number, spec in enumerate(recipe.pins, start=1)),
         method=recipe.method,
-        graph=recipe.graph,
-        free_radius=recipe.free_radius,
-        solver=recipe.solver,
-        adaptation=recipe.adaptation,
-        hops=recipe.hops,
-        blending=recipe.blending,
+        options=recipe.options,
     )
 
 

@@ -1,7 +1,7 @@
 """The slow stages of a scene: made in full, loaded, or brought up to date after a mend."""
 
-from collections.abc import Iterable
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from typing import NamedTuple, Protocol
 
@@ -11,14 +11,13 @@ from numpy.typing import NDArray
 
 from splap_editor.core.graph.options import NEIGHBORHOODS, GraphOptions
 from splap_editor.core.graph.splat_graph import SplatGraph, mended_graph, splat_graph
+from splap_editor.core.kept_arrays import Arrays, require_array, require_rows
 from splap_editor.core.options import loaded
-from splap_editor.core.progress import Progress
+from splap_editor.core.progress import Progress, StageProgress
 from splap_editor.core.splats.occupancy import Ellipses
 from splap_editor.core.surface.geodesics import Neighborhoods
 from splap_editor.core.surface.laplacian import point_cloud_laplacian
 from splap_editor.core.surface.local_triangulation import local_triangulations, mended_triangulations
-from splap_editor.engine.cache import Arrays, require_array, require_rows
-from splap_editor.engine.parallel_lock import alone
 
 
 class Timed(Protocol):
@@ -26,14 +25,6 @@ class Timed(Protocol):
 
     def __call__(self, stage: str) -> AbstractContextManager:
         """Begin a block."""
-        ...
-
-
-class StageProgress(Protocol):
-    """Gives the progress callback of a named stage."""
-
-    def __call__(self, stage: str) -> Progress:
-        """Begin a stage."""
         ...
 
 
@@ -67,7 +58,18 @@ def unmended(options: GraphOptions) -> GraphOptions:
     return replace(options, cut=(), add=())
 
 
-def plain_stages(ellipses: Ellipses, options: GraphOptions, timed: Timed, stages: StageProgress) -> SurfaceStages:
+Guard = Callable[[Progress], AbstractContextManager]
+"""Entered around loops that run on several cores: who has several threads lets one at a time in."""
+
+
+def unguarded(progress: Progress) -> AbstractContextManager:
+    """For who has one thread."""
+    return nullcontext()
+
+
+def plain_stages(
+    ellipses: Ellipses, options: GraphOptions, timed: Timed, stages: StageProgress, alone: Guard = unguarded
+) -> SurfaceStages:
     """Make everything, without cut and added edges."""
     options = unmended(options)
     with timed("graph"), alone(stages("graph")):
@@ -82,7 +84,12 @@ def plain_stages(ellipses: Ellipses, options: GraphOptions, timed: Timed, stages
 
 
 def mended_stages(
-    ellipses: Ellipses, before: SurfaceStages, options: GraphOptions, timed: Timed, stages: StageProgress
+    ellipses: Ellipses,
+    before: SurfaceStages,
+    options: GraphOptions,
+    timed: Timed,
+    stages: StageProgress,
+    alone: Guard = unguarded,
 ) -> SurfaceStages:
     """Go on from stages that differ in cut and added edges only: to the bit what all stages would give.
 

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from splap_editor.core.bbw.rigid_curves import rigid_curve, scale_curve
+from splap_editor.core.pose import Pose
 from splap_editor.core.splats.rotations import matrices_to_quats, quats_to_matrices
-from splap_editor.engine.pose import Pose
 
 LAST_FRAME = 1_000_000
 

@@ -7,56 +7,50 @@ from typing import Any
 
 import numpy as np
 
+from splap_editor.core.adaptation.options import AdaptationOptions
+from splap_editor.core.deformers import DEFORMERS, method_titles
 from splap_editor.core.graph.options import GraphOptions
-from splap_editor.core.options import options_of
+from splap_editor.core.options import OptionSet, ShareOfSize, options_of
+from splap_editor.core.pose import LARGEST_COORDINATE, SCALES, Pose
+from splap_editor.core.reach_options import CageOptions, ReachOptions
 from splap_editor.io.atomic_file import atomic_file
 from splap_editor.io.json_object import JsonObject, json_lines, parsed_json, shown
-from splap_editor.io.recipe_specs import (
-    DEFAULT_RADIUS,
-    LARGEST_COORDINATE,
-    SCALES,
-    HandleSpec,
-    PinSpec,
-    PoseSpec,
-    Recipe,
-    SolverSpec,
-    Vector,
-)
+from splap_editor.io.recipe_specs import HandleSpec, PinSpec, Recipe, Vector
 from splap_editor.io.regular_file import regular_bytes
 
 __all__ = [
-    "DEFAULT_RADIUS",
     "HandleSpec",
     "PinSpec",
-    "PoseSpec",
     "Recipe",
     "RecipeError",
-    "SolverSpec",
     "pose_from_json",
     "pose_to_json",
     "read_recipe",
     "recipe_from_json",
+    "recipe_groups",
     "recipe_to_json",
     "write_recipe",
 ]
 
 VERSION = 1
 
-_RECIPE_KEYS = (
-    "version",
-    "method",
-    "graph",
-    "free_radius",
-    "handles",
-    "pins",
-    "solver",
-    "adaptation",
-    "hops",
-    "blending",
-)
-_REGION_KEYS = ("center", "radius", "rows")
-_HANDLE_KEYS = ("name", *_REGION_KEYS, "translate", "rotate", "scale", "cage_radius")
-_SOLVER_KEYS = ("kind", "tolerance", "iterations", "smoothness")
+REGION_KEYS = ("center", "radius", "rows")
+HANDLE_KEYS = ("name", *REGION_KEYS, "translate", "rotate", "scale", *options_of(CageOptions))
+
+
+def recipe_groups() -> tuple[tuple[str, type], ...]:
+    """Option groups in the order of their keys; an empty key for those whose options are keys of the recipe itself."""
+    groups = [("graph", GraphOptions), ("", ReachOptions), ("", AdaptationOptions)]
+    for row in DEFORMERS:
+        if (row.key, row.options) not in groups:
+            groups.insert(2 if row.key else len(groups), (row.key, row.options))
+    return tuple(groups)
+
+
+def recipe_keys() -> tuple[str, ...]:
+    """Keys that a recipe may have."""
+    keys = [key for key, group in recipe_groups() for key in ([key] if key else options_of(group))]
+    return ("version", "method", "handles", "pins", *keys)
 
 
 class RecipeError(ValueError):
@@ -118,29 +112,16 @@ def recipe_from_json(value: Any) -> Recipe:
             raise RecipeError(f'version is missing: put "version": {VERSION} into it')
         if isinstance(version, bool) or version != VERSION:
             raise RecipeError(f"version must be {VERSION}, got {shown(version)}: a newer one needs a newer editor")
-    recipe = JsonObject(value, "", _RECIPE_KEYS, RecipeError)
-    free_radius = None
-    if not recipe.is_null("free_radius"):
-        free_radius = recipe.number("free_radius", above=0) if "free_radius" in recipe else DEFAULT_RADIUS
+    recipe = JsonObject(value, "", recipe_keys(), RecipeError)
+    groups: list[Any] = [
+        (recipe.object(key, tuple(options_of(group))) if key else recipe).options(group)
+        for key, group in recipe_groups()
+    ]
     return Recipe(
-        method=recipe.choice("method", ("arap", "bbw"), Recipe.method),
-        graph=recipe.object("graph", tuple(options_of(GraphOptions))).options(GraphOptions),
-        free_radius=free_radius,
-        handles=tuple(_handle(h, i) for i, h in enumerate(recipe.objects("handles", _HANDLE_KEYS))),
-        pins=tuple(PinSpec(*_region(pin)) for pin in recipe.objects("pins", _REGION_KEYS)),
-        solver=_solver(recipe.object("solver", _SOLVER_KEYS)),
-        adaptation=recipe.choice("adaptation", ("surface", "affine", "none"), Recipe.adaptation),
-        hops=recipe.integer("hops", Recipe.hops, low=1, high=3),
-        blending=recipe.choice("blending", ("dual-quaternion", "linear"), Recipe.blending),
-    )
-
-
-def _solver(solver: JsonObject) -> SolverSpec:
-    return SolverSpec(
-        kind=solver.choice("kind", ("converged", "local-global", "libigl"), SolverSpec.kind),
-        tolerance=solver.number("tolerance", SolverSpec.tolerance, above=0),
-        iterations=solver.integer("iterations", SolverSpec.iterations, low=1),
-        smoothness=solver.number("smoothness", SolverSpec.smoothness, above=0, least=True),
+        handles=tuple(_handle(h, i) for i, h in enumerate(recipe.objects("handles", HANDLE_KEYS))),
+        pins=tuple(PinSpec(*_region(pin)) for pin in recipe.objects("pins", REGION_KEYS)),
+        method=recipe.choice("method", tuple(method_titles()), Recipe.method),
+        options=OptionSet(*groups),
     )
 
 
@@ -157,9 +138,6 @@ def _region(region: JsonObject) -> tuple[Vector | None, float | None, tuple[int,
 def _handle(handle: JsonObject, index: int) -> HandleSpec:
     center, radius, rows = _region(handle)
     pose = pose_from_json(handle)
-    cage_radius = None
-    if not handle.is_null("cage_radius"):
-        cage_radius = handle.number("cage_radius", above=0) if "cage_radius" in handle else DEFAULT_RADIUS
     return HandleSpec(
         name=handle.text("name", f"handle {index + 1}"),
         center=center,
@@ -168,11 +146,11 @@ def _handle(handle: JsonObject, index: int) -> HandleSpec:
         translate=pose.translate,
         rotate=pose.rotate,
         scale=pose.scale,
-        cage_radius=cage_radius,
+        cage_radius=handle.options(CageOptions).cage_radius,
     )
 
 
-def pose_from_json(pose: JsonObject) -> PoseSpec:
+def pose_from_json(pose: JsonObject) -> Pose:
     """Pose of an object with the keys translate, rotate and scale, each at rest where it is missing."""
     rotate = pose.vector("rotate", 4, HandleSpec.rotate)
     length = math.hypot(*rotate)
@@ -180,25 +158,27 @@ def pose_from_json(pose: JsonObject) -> PoseSpec:
         raise pose.refuse("rotate", "a quaternion w, x, y, z that is not zero")
     if abs(length - 1) > 1e-12:
         # Twice, since the length of very short ones is imprecise.
-        rotate = tuple(part / length for part in rotate)
-        rotate = tuple(part / math.hypot(*rotate) for part in rotate)
-    return PoseSpec(pose.vector("translate", 3, HandleSpec.translate, most=LARGEST_COORDINATE), rotate, _scale(pose))
+        w, x, y, z = (part / length for part in rotate)
+        length = math.hypot(w, x, y, z)
+        rotate = (w / length, x / length, y / length, z / length)
+    return Pose(pose.vector("translate", 3, HandleSpec.translate, most=LARGEST_COORDINATE), rotate, _scale(pose))
 
 
-def pose_to_json(pose: PoseSpec) -> dict[str, Any]:
+def pose_to_json(pose: Pose) -> dict[str, Any]:
     """Plain objects of a pose; what is at rest is left out."""
-    return _without_defaults(pose, PoseSpec())
+    return _without_defaults(pose, Pose())
 
 
 def _scale(handle: JsonObject) -> float | Vector:
     """One factor, or one for each world axis."""
+    scale: float | Vector
     try:
-        scale = handle.number("scale", HandleSpec.scale)
+        scale = handle.number("scale", 1.0)
     except ValueError:
         try:
             scale = handle.vector("scale", 3)
         except ValueError:
-            scale = (0.0,)
+            scale = 0.0
     least, largest = np.min(scale), np.max(scale)
     if not SCALES[0] <= least <= largest <= SCALES[1]:
         raise handle.refuse("scale", f"a number from {SCALES[0]:g} to {SCALES[1]:g}, or three of them")
@@ -208,25 +188,34 @@ def _scale(handle: JsonObject) -> float | Vector:
 def recipe_to_json(recipe: Recipe) -> dict[str, Any]:
     """Plain objects of a recipe for ``json``; what is left at its default is left out."""
     value: dict[str, Any] = {"version": VERSION, "method": recipe.method}
-    graph = _without_defaults(recipe.graph, GraphOptions())
-    if graph:
-        value["graph"] = graph
-    if not _is_default(recipe.free_radius):
-        value["free_radius"] = recipe.free_radius
+    said = {(key, group): _said(recipe.options[group]) for key, group in recipe_groups()}
+    # The keys of the first version stand where they stood.
+    for key, group in (("graph", GraphOptions), ("", ReachOptions)):
+        _put(value, key, said.pop((key, group)))
     # The region of a handle has no default, so it never goes missing.
     value["handles"] = [{"name": h.name, **_without_defaults(h, HandleSpec(name=h.name))} for h in recipe.handles]
     value["pins"] = [_without_defaults(pin, PinSpec()) for pin in recipe.pins]
-    value["solver"] = {"kind": recipe.solver.kind, **_without_defaults(recipe.solver, SolverSpec())}
-    value["adaptation"] = recipe.adaptation
-    for key in ("hops", "blending"):
-        if getattr(recipe, key) != getattr(Recipe, key):
-            value[key] = getattr(recipe, key)
+    for (key, _), options in said.items():
+        _put(value, key, options)
     return value
 
 
-def _is_default(radius: float | None) -> bool:
-    """Whether a radius is left to the program."""
-    return radius is not None and math.isnan(radius)
+def _put(value: dict[str, Any], key: str, options: dict[str, Any]) -> None:
+    """Put options under their key, if there are any, or among those of the recipe."""
+    if not key:
+        value.update(options)
+    elif options:
+        value[key] = options
+
+
+def _said(group: Any) -> dict[str, Any]:
+    """Options of a group that a recipe says."""
+    held = {name: (known, getattr(group, name)) for name, known in options_of(group).items()}
+    return {
+        name: _plain(value)
+        for name, (known, value) in held.items()
+        if known.is_always_written or value != known.default
+    }
 
 
 def _without_defaults(spec: Any, default: Any) -> dict[str, Any]:
@@ -242,6 +231,8 @@ def _without_defaults(spec: Any, default: Any) -> dict[str, Any]:
 
 def _plain(value: Any) -> Any:
     """Value with lists for tuples and Python's numbers for numpy's."""
+    if isinstance(value, ShareOfSize):
+        raise RecipeError(f"a length of {value.share:g} times the size cannot be written: give it in the file's units")
     if isinstance(value, tuple | list | np.ndarray):
         return [_plain(item) for item in value]
     return value.item() if isinstance(value, np.generic) else value

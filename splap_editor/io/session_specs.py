@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.io.recipe_specs import PoseSpec, Recipe, Vector
+from splap_editor.core.pose import Pose
+from splap_editor.io.recipe_specs import Recipe, Vector
 
 Scalar = str | bool | int | float
 
@@ -46,7 +47,7 @@ class KeySpec:
     """Poses of handles, by id, at a frame."""
 
     frame: int
-    poses: Mapping[int, PoseSpec]
+    poses: Mapping[int, Pose]
 
 
 @dataclass(frozen=True)

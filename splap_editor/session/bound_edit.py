@@ -1,20 +1,8 @@
-"""A deformer ready to pose, and what it was made for."""
+"""What quantities of a scene are worked out from, and which of them can be exported."""
 
-from dataclasses import dataclass
-
-from splap_editor.core.deformer import Deformer, Handles
-from splap_editor.engine.edit import Edit
+from splap_editor.engine.bound_edit import BoundEdit
 from splap_editor.engine.quantities import QUANTITIES, Snapshot, missing
 from splap_editor.session.scene import Scene
-
-
-@dataclass(frozen=True, eq=False)
-class BoundEdit:
-    """A deformer, and the edit it was bound for."""
-
-    edit: Edit
-    handles: Handles
-    deformer: Deformer
 
 
 def snapshot_of(scene: Scene, bound: BoundEdit | None) -> Snapshot:
@@ -24,7 +12,7 @@ def snapshot_of(scene: Scene, bound: BoundEdit | None) -> Snapshot:
     """
     weights, handle = None, None
     if bound is not None:
-        weights = getattr(bound.deformer, "weights", None)
+        weights = bound.weights
         held = [each.handle_id for each in bound.edit.active_handles]
         chosen = [held.index(handle_id) for handle_id in scene.active_handles if handle_id in held]
         handle = chosen[-1] if chosen else 0 if held else None

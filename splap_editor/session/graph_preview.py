@@ -2,11 +2,11 @@
 
 from splap_editor.core.graph.options import GraphOptions, edges_only
 from splap_editor.core.graph.splat_graph import SplatGraph, splat_graph
-from splap_editor.engine.parallel_lock import alone
 from splap_editor.session.jobs import REPORT_SECONDS, Job
 from splap_editor.session.latest_job import LatestJob
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
+from splap_editor.session.side_by_side import alone
 from splap_editor.session.signals import Signal
 
 

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from splap_editor.core.handle_nodes import Region
+from splap_editor.core.pose import Pose
 from splap_editor.core.splats.occupancy import Ellipses
 from splap_editor.core.splats.symmetry import Plane
 from splap_editor.engine.edit import HANDLE_COLORS, Edit, Handle
-from splap_editor.engine.pose import Pose
 
 _NEAR = 0.03
 """A handle with its centre this near to where a mirrored one belongs is its counterpart; units of the scene scale."""

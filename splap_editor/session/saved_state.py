@@ -8,7 +8,6 @@ import numpy as np
 
 from splap_editor.core.index_spaces import FileMask
 from splap_editor.engine.edit import Edit
-from splap_editor.engine.pose import Pose
 from splap_editor.engine.recipe_edit import edit_of, recipe_of
 from splap_editor.engine.timeline import Key, Timeline
 from splap_editor.io.session_file import SessionFileError, relative_path
@@ -16,7 +15,6 @@ from splap_editor.io.session_specs import (
     HandleSettings,
     KeySpec,
     PlySpec,
-    PoseSpec,
     Scalar,
     SessionFile,
     TimelineSpec,
@@ -138,16 +136,10 @@ def restore_scene(scene: Scene, session: SessionFile) -> None:
 
 
 def _timeline_spec(timeline: Timeline) -> TimelineSpec:
-    keys = tuple(
-        KeySpec(key.frame, {h: PoseSpec(pose.translate, pose.rotate, pose.scale) for h, pose in key.poses.items()})
-        for key in timeline.keys
-    )
+    keys = tuple(KeySpec(key.frame, dict(key.poses)) for key in timeline.keys)
     return TimelineSpec(keys, timeline.frame, timeline.n_frames, timeline.fps, timeline.is_smooth, timeline.is_auto)
 
 
 def _timeline(spec: TimelineSpec) -> Timeline:
-    keys = tuple(
-        Key(key.frame, {h: Pose(pose.translate, pose.rotate, pose.scale) for h, pose in key.poses.items()})
-        for key in spec.keys
-    )
+    keys = tuple(Key(key.frame, dict(key.poses)) for key in spec.keys)
     return Timeline(keys, spec.frame, spec.n_frames, spec.fps, spec.is_smooth, spec.is_auto)

@@ -11,7 +11,7 @@ from splap_editor.core.index_spaces import FileMask, FileRow
 from splap_editor.core.splats.occupancy import Ellipses
 from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.edit import Edit
-from splap_editor.engine.pipeline import Surface
+from splap_editor.engine.surface import Surface
 from splap_editor.io.ply import SplatFile
 from splap_editor.session.signals import Signal
 

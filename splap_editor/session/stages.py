@@ -7,7 +7,7 @@ from typing import Any
 from splap_editor.engine.cache import StageCache
 from splap_editor.engine.edit import Edit, binds_like, poses_like
 from splap_editor.engine.export_report import ExportReport
-from splap_editor.engine.pipeline import Surface
+from splap_editor.engine.surface import Surface
 from splap_editor.session.bound_edit import BoundEdit, snapshot_of
 from splap_editor.session.depictor import Depictor, Unseen
 from splap_editor.session.jobs import Job

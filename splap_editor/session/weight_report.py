@@ -5,8 +5,7 @@ from numpy.typing import NDArray
 
 from splap_editor.core.bbw.bbw import BbwDeformer, BbwReport
 from splap_editor.engine.edit import Edit
-from splap_editor.engine.pipeline import Surface
-from splap_editor.session.scene import Scene
+from splap_editor.engine.surface import Surface
 
 EXACT = 1e-12
 """Violations below this are roundoff."""
@@ -37,11 +36,6 @@ def splat_weights(surface: Surface, deformer: BbwDeformer, column: int) -> NDArr
     carried = np.sum(of_nodes[binding.inert_carriers] * binding.inert_weights, axis=1)
     weights[np.flatnonzero(ellipses.node_of_row < 0)] = carried
     return weights
-
-
-def cage_radius(scene: Scene, radius: float | None) -> float | None:
-    """Reach of a handle's weight in world units, the default filled in; None for the whole object."""
-    return 0.3 * scene.ellipses.scene_scale if radius is not None and np.isnan(radius) else radius
 
 
 def weight_lines(edit: Edit, report: BbwReport) -> list[tuple[str, str]]:

@@ -11,16 +11,17 @@ from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels, adapt
 from splap_editor.core.deformer import Deformation
 from splap_editor.core.graph.splat_graph import GraphOptions
 from splap_editor.core.splats.occupancy import occupancy_ellipses
+from splap_editor.engine.bound_edit import BoundEdit, Posed, bind, ready_for_drags
 from splap_editor.engine.cache import StageCache
 from splap_editor.engine.edit import Edit
 from splap_editor.engine.export_report import ExportReport, export_report
-from splap_editor.engine.pipeline import Surface, deformer_of, handles_of, kernels_of, surface_of
 from splap_editor.engine.quantities import Snapshot, columns_of
+from splap_editor.engine.surface import Surface, surface_of
 from splap_editor.io.ply import SplatFile, read_ply, write_ply
-from splap_editor.session.bound_edit import BoundEdit
 from splap_editor.session.depictor import Depictor, HandOver
 from splap_editor.session.jobs import Job
 from splap_editor.session.scene import Scene
+from splap_editor.session.side_by_side import alone, side_by_side
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,9 +83,10 @@ def prepared_surface(job: Job, request: SurfaceRequest) -> Surface:
         cache=request.cache,
         stages=job.progress,
         near=request.near,
+        alone=alone,
     )
     job.report(0.0, "coarse model")
-    _ = surface.arap_scene.coarse  # made here, so that the first drag need not wait for it
+    ready_for_drags(surface)
     return surface
 
 
@@ -100,18 +102,14 @@ class BindRequest:
 
 def bound_edit(job: Job, request: BindRequest) -> BoundEdit:
     """Bind the deformer of an edit."""
-    surface, edit = request.surface, request.edit
-    handles = handles_of(surface, edit)
-    made = deformer_of(
-        surface,
-        edit,
-        handles,
+    return bind(
+        request.surface,
+        request.edit,
         cache=request.cache,
         progress=job.progress("binding"),
         stages=job.progress,
-        n_threads=request.n_threads,
+        run=side_by_side(request.n_threads),
     )
-    return BoundEdit(edit, handles, made)
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,23 +145,23 @@ class MadePose:
 
 def dragged_pose(job: Job, request: PoseRequest) -> MadePose:
     """Pose at the speed of a drag."""
-    return _made_pose(request, request.bound.deformer.drag(request.edit.transforms))
+    return _made_pose(request, request.bound.drag(request.edit))
 
 
 def settled_pose(job: Job, request: PoseRequest) -> MadePose:
     """Pose to the end, and show how it comes about."""
 
-    def shown(deformation: Deformation) -> None:
-        made = _made_pose(request, deformation)
+    def shown(posed: Posed) -> None:
+        made = _made_pose(request, posed)
         job.deliver(lambda: request.show(made))
 
-    solve = request.bound.deformer.solve
-    return _made_pose(request, solve(request.edit.transforms, progress=job.progress("settling"), shown=shown))
+    settling = job.progress("settling")
+    posed = request.bound.pose(request.edit, progress=settling, shown=shown)
+    return _made_pose(request, posed)
 
 
-def _made_pose(request: PoseRequest, deformation: Deformation) -> MadePose:
-    kernels = kernels_of(request.surface, request.edit, deformation)
-    return MadePose(kernels, deformation, request.present(kernels))
+def _made_pose(request: PoseRequest, posed: Posed) -> MadePose:
+    return MadePose(posed.kernels, posed.deformation, request.present(posed.kernels))
 
 
 @dataclass(frozen=True, eq=False)

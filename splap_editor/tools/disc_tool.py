@@ -6,7 +6,7 @@ import numpy as np
 
 from splap_editor.core.handle_nodes import Region
 from splap_editor.core.options import option
-from splap_editor.engine.pose import Pose
+from splap_editor.core.pose import Pose
 from splap_editor.session.placement import disc_rows, held_pose, rows_region
 from splap_editor.tools.bindings import Binding
 from splap_editor.tools.tool import KeyEvent, PointerEvent, Tool, ToolContext

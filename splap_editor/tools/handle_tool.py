@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from splap_editor.core.handle_nodes import Region
-from splap_editor.engine.pose import Pose
+from splap_editor.core.pose import Pose
 from splap_editor.tools.bindings import Binding
 from splap_editor.tools.disc_tool import RESIZE, DiscOptions, DiscTool
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from splap_editor.core.graph.ellipse_offset import normal_offsets
 from splap_editor.core.index_spaces import FileRows
-from splap_editor.engine.pipeline import Surface
+from splap_editor.engine.surface import Surface
 from splap_editor.session.jobs import Job
 from splap_editor.session.latest_job import LatestJob
 from splap_editor.session.scene_follower import SceneFollower

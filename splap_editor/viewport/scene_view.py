@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
 from splap_editor.core.index_spaces import FileRows, RowsByPlace
+from splap_editor.core.options import world_length
+from splap_editor.core.reach_options import ReachOptions
 from splap_editor.core.splats.rotations import quats_to_matrices
 from splap_editor.core.splats.spherical_harmonics import view_colors
 from splap_editor.core.splats.splats import Splats
@@ -197,9 +199,9 @@ class SceneView:
         """Draw the free radius about each active handle, facing the viewer."""
         scene, rings = self._scene, self.viewport.rings
         rings.hide("free")
-        if is_shown and scene is not None and scene.edit.free_radius is not None:
-            radius = scene.edit.free_radius
-            radius = 0.5 * scene.ellipses.scene_scale if np.isnan(radius) else radius
+        free = scene.edit.options[ReachOptions].free_radius if is_shown and scene is not None else None
+        if free is not None:
+            radius = world_length(free, scene.ellipses.scene_scale)
             direction = self.viewport.projection.direction
             handles = [handle for handle in scene.edit.active_handles if handle.handle_id in scene.active_handles]
             loops = [circle(handle.region.center, direction, radius) for handle in handles]

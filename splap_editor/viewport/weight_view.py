@@ -6,12 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.handle_nodes import Region, handle_nodes
+from splap_editor.core.options import world_length
 from splap_editor.engine.edit import Handle
 from splap_editor.session.scene import Scene
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.session.signals import Signal
-from splap_editor.session.weight_report import cage_radius, splat_weights
+from splap_editor.session.weight_report import splat_weights
 from splap_editor.viewport.viewport import Viewport
 from splap_editor.viewport.weight_colors import weight_tints
 
@@ -77,7 +78,7 @@ class WeightView:
     def _chosen(self) -> Handle | None:
         """The handle whose cage and weights are looked at: the one chosen last."""
         scene = self._session.scene
-        if scene is None or scene.edit.method != "bbw":
+        if scene is None or not scene.edit.deformer.has_weights:
             return None
         wanted = scene.active_handles
         found = [handle for handle in scene.edit.active_handles if handle.handle_id in wanted]
@@ -89,7 +90,8 @@ class WeightView:
         scene, bound = self._session.scene, self._session.bound
         handle, column = None, -1
         if self._is_on and scene is not None and scene.surface is not None and bound is not None:
-            shown = bound.edit.active_handles if bound.edit.method == scene.edit.method == "bbw" else ()
+            row = scene.edit.deformer
+            shown = bound.edit.active_handles if row.has_weights and bound.edit.deformer == row else ()
             handle = self._chosen() or next(iter(shown), None)
             ids = [each.handle_id for each in shown]
             column = ids.index(handle.handle_id) if handle is not None and handle.handle_id in ids else -1
@@ -113,7 +115,7 @@ class WeightView:
 
     def _show_cage(self, radius: float | None) -> None:
         scene, handle = self._session.scene, self._chosen()
-        radius = cage_radius(scene, radius) if handle is not None else None
+        radius = world_length(radius, scene.ellipses.scene_scale) if handle is not None else None
         # A drag shows the deformed object; the cage is of the one at rest.
         if radius is None or radius <= 0 or scene.preview is not None:
             self._viewport.cage.hide()

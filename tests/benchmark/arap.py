@@ -24,10 +24,12 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
-from splap_editor.core.arap.arap import ArapDeformer, ArapOptions
-from splap_editor.core.arap.problem import FREE, PIN, ArapProblem, Constraints, Pose
+from splap_editor.core.arap.arap import ArapDeformer
+from splap_editor.core.arap.binding import arap_deformer
+from splap_editor.core.arap.options import ArapOptions
+from splap_editor.core.arap.problem import ArapProblem, Constraints, Pose
 from splap_editor.core.arap.scene import ArapScene
-from splap_editor.core.deformer import Handles
+from splap_editor.core.deformer import FREE, PIN, Handles
 from splap_editor.core.graph.splat_graph import SplatGraph
 from splap_editor.core.splats.morton import morton_order
 
@@ -92,7 +94,7 @@ class Case:
 
     def deformer(self, scene: ArapScene | None = None, **options: float) -> ArapDeformer:
         """A deformer bound to the handle set."""
-        return ArapDeformer(
+        return arap_deformer(
             self.rest, self.L, self.handles(), scene_scale=self.scale, M=self.M, graph=self.graph,
             scene=self.scene if scene is None else scene, options=ArapOptions(**options),
         )  # fmt: skip

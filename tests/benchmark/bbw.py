@@ -20,7 +20,8 @@ from scipy.spatial import ConvexHull
 
 from splap_editor.core.bbw.bbw import BbwDeformer
 from splap_editor.core.bbw.box_qp import box_qp
-from splap_editor.core.bbw.weights import BbwOptions, BbwProblem, HandleWeight, bbw_problem, handle_weight
+from splap_editor.core.bbw.options import BbwOptions
+from splap_editor.core.bbw.weights import BbwProblem, HandleWeight, bbw_problem, handle_weight
 from splap_editor.core.deformer import Handles
 from splap_editor.core.splats.morton import morton_order
 from tests.benchmark.peers import note, report, timed

@@ -150,7 +150,7 @@ def settled(
     rest: NDArray[np.float64], L: sp.csr_matrix, constrained: NDArray[np.int64], targets: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Settle ARAP with the editor's own solver, on splats and on the mesh alike."""
-    from splap_editor.core.arap.arap import ArapDeformer
+    from splap_editor.core.arap.binding import arap_deformer
     from splap_editor.core.deformer import Handles
 
     moves = targets - rest[constrained]
@@ -164,7 +164,7 @@ def settled(
     lengths = np.linalg.norm(rest[coo.row] - rest[coo.col], axis=1)
     graph = SplatGraph(W.indptr.astype(np.int32), W.indices.astype(np.int32), lengths, None, 0.0)
     masses = np.full(len(rest), 1.0 / len(rest))
-    deformer = ArapDeformer(rest, sp.csr_matrix(L), handles, scene_scale=size, M=masses, graph=graph)
+    deformer = arap_deformer(rest, sp.csr_matrix(L), handles, scene_scale=size, M=masses, graph=graph)
     transform = np.eye(4)[None].copy()
     transform[0, :3, 3] = moves[moving].mean(0)
     return deformer.solve(transform).positions

@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from splap_editor.core.arap.options import ArapOptions
+from splap_editor.core.bbw.options import BbwOptions
 from splap_editor.core.handle_nodes import Region
+from splap_editor.core.reach_options import ReachOptions
 from splap_editor.core.splats.rotations import quats_to_matrices
 from splap_editor.engine.edit import Edit, Handle, Pose, binds_like, poses_like
-from splap_editor.io.recipe import SolverSpec
 
 
 def similarity(rng):
@@ -66,13 +68,13 @@ def test_a_disabled_handle_neither_binds_nor_poses():
 def test_only_what_the_method_uses_asks_for_a_new_binding():
     arap = Edit().with_handle(handle())
     bbw = replace(arap, method="bbw")
-    for field, value, needed_by in (
-        ("free_radius", 2.0, "arap"),
-        ("solver", SolverSpec(iterations=3), "arap"),
-        ("blending", "linear", "bbw"),
+    for options, needed_by in (
+        (ReachOptions(2.0), "arap"),
+        (ArapOptions(iterations=3), "arap"),
+        (BbwOptions(blending="linear"), "bbw"),
     ):
-        assert binds_like(arap, replace(arap, **{field: value})) == (needed_by != "arap"), field
-        assert binds_like(bbw, replace(bbw, **{field: value})) == (needed_by != "bbw"), field
+        assert binds_like(arap, arap.with_options(options)) == (needed_by != "arap"), options
+        assert binds_like(bbw, bbw.with_options(options)) == (needed_by != "bbw"), options
     wider = replace(arap.handles[0], cage_radius=None)
     assert binds_like(arap, arap.with_handle(wider))
     assert not binds_like(bbw, bbw.with_handle(wider))

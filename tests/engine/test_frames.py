@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
+from splap_editor.core.options import OptionSet
 from splap_editor.core.progress import Cancelled
+from splap_editor.core.reach_options import ReachOptions
 from splap_editor.engine.edit import Edit, Handle, Pose
 from splap_editor.engine.frames import FramePoser, frame_path, frame_poser, frame_range, write_frames
 from splap_editor.engine.keyframes import edit_at_frame, keyed_edit
-from splap_editor.engine.pipeline import surface_of
+from splap_editor.engine.surface import surface_of
 from splap_editor.io.ply import read_ply
 from splap_editor.resources import resource
 from splap_editor.session.placement import Region
@@ -25,7 +27,7 @@ def poser(file) -> FramePoser:
     """The tube's end, at rest in frame 1 and lifted in frame 9."""
     surface = surface_of(file.splats, Edit().graph)
     center = surface.ellipses.centers[np.argmax(surface.ellipses.centers[:, 2])]
-    edit = Edit(handles=(Handle(1, "end", "#ffffff", Region(center, 0.15)),), free_radius=None)
+    edit = Edit(handles=(Handle(1, "end", "#ffffff", Region(center, 0.15)),), options=OptionSet(ReachOptions(None)))
     edit = keyed_edit(edit, 1)
     edit = keyed_edit(edit_at_frame(edit, 9).with_poses({1: Pose((0.2, 0.0, 0.1))}))
     return frame_poser(surface, edit)

@@ -7,7 +7,7 @@ import pytest
 
 from splap_editor.core.graph.splat_graph import GraphOptions
 from splap_editor.engine.cache import StageCache
-from splap_editor.engine.pipeline import Surface, surface_of
+from splap_editor.engine.surface import Surface, surface_of
 from splap_editor.io.ply import read_ply
 from splap_editor.resources import resource
 

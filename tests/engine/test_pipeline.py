@@ -6,19 +6,26 @@ import numpy as np
 import pytest
 
 from splap_editor.core.adaptation.kernel_adaptation import adapted_splats
+from splap_editor.core.adaptation.options import AdaptationOptions
+from splap_editor.core.arap.options import ArapOptions
 from splap_editor.core.graph.splat_graph import GraphOptions
 from splap_editor.core.handle_nodes import Region
-from splap_editor.core.progress import Cancelled, no_progress
+from splap_editor.core.options import OptionSet
+from splap_editor.core.progress import Cancelled
+from splap_editor.core.reach_options import ReachOptions
 from splap_editor.core.splats.rotations import quats_to_matrices
 from splap_editor.core.splats.splats import Splats
+from splap_editor.engine.bound_edit import bind
 from splap_editor.engine.cache import StageCache
 from splap_editor.engine.edit import Edit, Handle, Pose
-from splap_editor.engine.pipeline import deformer_of, handles_of, kernels_of, surface_of
 from splap_editor.engine.recipe_edit import edit_of, recipe_of
+from splap_editor.engine.surface import surface_of
 from splap_editor.engine.surface_stages import packed_stages
 from splap_editor.io.ply import read_ply
-from splap_editor.io.recipe import SolverSpec, recipe_from_json, recipe_to_json
+from splap_editor.io.recipe import recipe_from_json, recipe_to_json
 from splap_editor.resources import resource
+
+FREED = OptionSet(ReachOptions(None))
 
 
 @pytest.fixture(scope="module")
@@ -33,8 +40,7 @@ def surface(splats):
 
 
 def posed(surface, splats, edit):
-    deformer = deformer_of(surface, edit, handles_of(surface, edit), progress=no_progress)
-    return kernels_of(surface, edit, deformer.solve(edit.transforms))
+    return bind(surface, edit).pose().kernels
 
 
 def covariances(frames, log_scales):
@@ -51,7 +57,7 @@ def end_edit(splats, **changes) -> Edit:
     lift = np.roll([0.0, 3.0 * reach, 0.0], axis)
     handle = Handle(1, "end", "#ffffff", Region(means[means[:, axis].argmax()], reach), Pose(tuple(lift.tolist())))
     pins = (Region(means[means[:, axis].argmin()], reach),)
-    return replace(Edit(handles=(handle,), pins=pins, free_radius=None), **changes)
+    return replace(Edit(handles=(handle,), pins=pins, options=FREED), **changes)
 
 
 def rotated(splats: Splats, rotation: np.ndarray, shift: np.ndarray) -> Splats:
@@ -69,7 +75,7 @@ def test_one_handle_and_nothing_held_is_exactly_its_rigid_motion(splats, surface
     quat = np.array([0.8, 0.3, -0.4, 0.33])
     pose = Pose((0.4, -0.7, 0.2), tuple((quat / np.linalg.norm(quat)).tolist()))
     handle = Handle(1, "all", "#ffffff", Region(center, 0.05), pose, cage_radius=None)
-    edit = Edit(handles=(handle,), free_radius=None, method=method)
+    edit = Edit(handles=(handle,), options=FREED, method=method)
     kernels = posed(surface, splats, edit)
     transform = handle.transform
     s = surface.ellipses.scene_scale
@@ -97,8 +103,8 @@ def test_a_handle_at_rest_changes_no_bit(splats, surface):
 
 def test_pinned_splats_stay_and_held_ones_arrive(splats, surface):
     edit = end_edit(splats)
-    handles = handles_of(surface, edit)
-    deformer = deformer_of(surface, edit, handles, progress=no_progress)
+    bound = bind(surface, edit)
+    handles, deformer = bound.handles, bound.deformer
     deformation = deformer.solve(edit.transforms)
     targets = handles.targets(surface.ellipses.centers, edit.transforms)
     np.testing.assert_allclose(deformation.positions[handles.indices], targets, atol=1e-12)
@@ -124,7 +130,7 @@ def test_moving_the_whole_scene_moves_the_result(splats, surface, seed):
             ),
         ),
         pins=tuple(Region(rotation @ pin.center + shift, pin.radius) for pin in edit.pins),
-        free_radius=None,
+        options=FREED,
     )
     here, there = posed(surface, splats, edit), posed(other, elsewhere, moved)
     s = surface.ellipses.scene_scale
@@ -204,12 +210,11 @@ def test_weights_that_do_not_fit_are_solved_again(splats, surface, tmp_path, nam
     said = []
     cache = StageCache(tmp_path, say=said.append)
     edit = end_edit(splats, method="bbw")
-    handles = handles_of(surface, edit)
-    first = deformer_of(surface, edit, handles, cache=cache, progress=no_progress)
+    first = bind(surface, edit, cache=cache).deformer
     key = next(tmp_path.iterdir()).stem
     kept = cache.load(key, dict)
     cache.store(key, {n: a for n, a in kept.items() if n != name} if change is set_to else damaged(kept, name, change))
-    second = deformer_of(surface, edit, handles, cache=cache, progress=no_progress)
+    second = bind(surface, edit, cache=cache).deformer
     assert len(said) == 1
     np.testing.assert_array_equal(first.weights, second.weights)
 
@@ -217,16 +222,15 @@ def test_weights_that_do_not_fit_are_solved_again(splats, surface, tmp_path, nam
 def test_bbw_weights_are_kept_between_runs(splats, surface, tmp_path):
     cache = StageCache(tmp_path)
     edit = end_edit(splats, method="bbw")
-    handles = handles_of(surface, edit)
-    first = deformer_of(surface, edit, handles, cache=cache, progress=no_progress)
-    second = deformer_of(surface, edit, handles, cache=cache, progress=no_progress)
+    first = bind(surface, edit, cache=cache).deformer
+    second = bind(surface, edit, cache=cache).deformer
     np.testing.assert_array_equal(first.weights, second.weights)
     assert second.report.handles == first.report.handles
     assert len(list(tmp_path.iterdir())) == 1
 
 
 def test_a_recipe_and_its_edit_are_the_same(splats, surface):
-    edit = end_edit(splats, adaptation="affine", hops=2)
+    edit = end_edit(splats).with_options(AdaptationOptions("affine", 2))
     again = edit_of(recipe_from_json(recipe_to_json(recipe_of(edit))), splats)
     assert recipe_of(again) == recipe_of(edit)
     np.testing.assert_array_equal(posed(surface, splats, again).means, posed(surface, splats, edit).means)
@@ -243,8 +247,7 @@ def test_what_is_pinned_stays_the_files_own_and_nothing_outruns_its_handle(splat
         handles=(handle,),
         pins=(Region(center, 0.0, np.flatnonzero(~near)),),
         method="bbw" if kind == "bbw" else "arap",
-        solver=SolverSpec() if kind == "bbw" else SolverSpec(kind=kind),
-        adaptation=adaptation,
+        options=OptionSet(ArapOptions() if kind == "bbw" else ArapOptions(kind=kind), AdaptationOptions(adaptation)),
     )
     kernels = posed(surface, splats, edit)
     assert near.sum() > 10 and kernels.changed[near].all() and not kernels.changed[~near].any()
@@ -255,13 +258,12 @@ def test_what_is_pinned_stays_the_files_own_and_nothing_outruns_its_handle(splat
 @pytest.mark.parametrize("method", ["arap", "bbw"])
 def test_a_cancelled_binding_leaves_the_surface_usable(splats, surface, method):
     edit = end_edit(splats, method=method)
-    handles = handles_of(surface, edit)
 
     def cancel(share):
         raise Cancelled
 
     with pytest.raises(Cancelled):
-        deformer_of(surface, edit, handles, progress=cancel)
+        bind(surface, edit, progress=cancel)
     assert np.isfinite(posed(surface, splats, edit).means).all()
 
 
@@ -281,5 +283,5 @@ def test_a_handful_of_splats_can_be_moved(splats, n):
     few = replace(splats, **fields)
     surface = surface_of(few, GraphOptions())
     handle = Handle(1, "one", "#ffffff", Region(surface.ellipses.centers[0], 1e-6), Pose((1.0, 0.0, 0.0)))
-    kernels = posed(surface, few, Edit(handles=(handle,), free_radius=None))
+    kernels = posed(surface, few, Edit(handles=(handle,), options=FREED))
     np.testing.assert_allclose(kernels.means, np.asarray(few.means, float) + np.array([1.0, 0.0, 0.0]), atol=1e-6)

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
+from splap_editor.core.pose import LARGEST_COORDINATE, SCALES, Pose
 from splap_editor.core.splats.rotations import quats_to_matrices
-from splap_editor.engine.pose import Pose
-from splap_editor.io.recipe_specs import LARGEST_COORDINATE, SCALES
 
 CENTER = np.array([1.0, -2.0, 0.5])
 

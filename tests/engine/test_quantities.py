@@ -9,11 +9,11 @@ from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
 from splap_editor.core.deformer import Deformation
 from splap_editor.core.graph.splat_graph import GraphOptions
 from splap_editor.core.handle_nodes import Region
-from splap_editor.core.progress import no_progress
 from splap_editor.core.splats.rotations import quats_to_matrices
+from splap_editor.engine.bound_edit import bind, kernels_of
 from splap_editor.engine.edit import Edit, Handle, Pose
-from splap_editor.engine.pipeline import Surface, deformer_of, handles_of, kernels_of, surface_of
 from splap_editor.engine.quantities import QUANTITIES, Snapshot, column_names, columns_of, missing, principal_stretches
+from splap_editor.engine.surface import Surface, surface_of
 from splap_editor.io.ply import read_ply
 from splap_editor.resources import resource
 
@@ -29,10 +29,9 @@ def snapshot() -> Snapshot:
     splats = replace(splats, logit_opacities=logits)
     surface = surface_of(splats, GraphOptions())
     edit = Edit(handles=(Handle(1, "end", "#ffffff", Region(surface.ellipses.centers[0], 0.2)),), method="bbw")
-    handles = handles_of(surface, edit)
-    deformer = deformer_of(surface, edit, handles, progress=no_progress)
+    bound = bind(surface, edit)
     return Snapshot(
-        splats, surface.ellipses, surface, None, handles, deformer.weights, 0, int(surface.ellipses.rows[0])
+        splats, surface.ellipses, surface, None, bound.handles, bound.weights, 0, int(surface.ellipses.rows[0])
     )
 
 
@@ -132,9 +131,8 @@ def test_columns_are_the_values_by_name(snapshot):
 def test_the_pose_of_a_bent_tube_is_stretched_both_ways(snapshot):
     surface = snapshot.surface
     edit = Edit(handles=(Handle(1, "end", "#ffffff", Region(surface.ellipses.centers[0], 0.2), Pose((0.3, 0.0, 0.2))),))
-    deformer = deformer_of(surface, edit, handles_of(surface, edit), progress=no_progress)
-    stretches = principal_stretches(
-        replace(snapshot, kernels=kernels_of(surface, edit, deformer.solve(edit.transforms)))
-    )[surface.ellipses.rows]
+    stretches = principal_stretches(replace(snapshot, kernels=bind(surface, edit).pose().kernels))[
+        surface.ellipses.rows
+    ]
     assert (stretches[:, 0] >= stretches[:, 1] - 1e-12).all() and (stretches > 0.0).all()
     assert stretches[:, 0].max() > 1.02 and stretches[:, 1].min() < 0.98

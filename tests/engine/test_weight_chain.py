@@ -1,14 +1,13 @@
 """A chain of three regions along an arm, as a skeleton would have it: joints bend without a pinch."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
+from splap_editor.core.bbw.options import BbwOptions
 from splap_editor.core.graph.splat_graph import GraphOptions
-from splap_editor.core.progress import no_progress
-from splap_editor.engine.pipeline import deformer_of, handles_of, kernels_of, surface_of
+from splap_editor.engine.bound_edit import bind, kernels_of
 from splap_editor.engine.recipe_edit import edit_of
+from splap_editor.engine.surface import surface_of
 from splap_editor.io.ply import read_ply
 from splap_editor.io.recipe import read_recipe
 from splap_editor.resources import resource
@@ -38,8 +37,8 @@ def radii(points):
 
 
 def bent(surface, blending):
-    edit = replace(edit_of(read_recipe(CHAIN), surface.binding.splats), blending=blending)
-    deformer = deformer_of(surface, edit, handles_of(surface, edit), progress=no_progress)
+    edit = edit_of(read_recipe(CHAIN), surface.binding.splats).with_options(BbwOptions(blending=blending))
+    deformer = bind(surface, edit).deformer
     return deformer, deformer.solve(edit.transforms), edit
 
 

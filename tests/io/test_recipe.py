@@ -6,14 +6,18 @@ import math
 import numpy as np
 import pytest
 
+from splap_editor.core.adaptation.options import AdaptationOptions
+from splap_editor.core.arap.options import ArapOptions
+from splap_editor.core.bbw.options import BbwOptions
 from splap_editor.core.graph.options import GraphOptions
+from splap_editor.core.options import OptionSet, ShareOfSize
+from splap_editor.core.pose import Pose
+from splap_editor.core.reach_options import CageOptions, ReachOptions
 from splap_editor.io.recipe import (
-    DEFAULT_RADIUS,
     HandleSpec,
     PinSpec,
     Recipe,
     RecipeError,
-    SolverSpec,
     read_recipe,
     recipe_from_json,
     recipe_to_json,
@@ -38,8 +42,8 @@ def random_recipe(seed):
     def maybe(**values):
         return {key: value for key, value in values.items() if rng.integers(2)}
 
-    def radius():
-        return [None, DEFAULT_RADIUS, float(rng.exponential())][rng.integers(3)]
+    def radius(usual):
+        return [None, usual, float(rng.exponential())][rng.integers(3)]
 
     def unit():
         quat = vector(4)
@@ -51,16 +55,20 @@ def random_recipe(seed):
             HandleSpec(
                 name=["hand", "Fuß", 'a "b"\n', ""][rng.integers(4)],
                 **region(True),
-                **maybe(translate=vector(), rotate=unit(), cage_radius=radius()),
+                **maybe(translate=vector(), rotate=unit(), cage_radius=radius(CageOptions.cage_radius)),
                 **maybe(scale=[0.5, tuple(rng.exponential(size=3).tolist())][rng.integers(2)]),
             )
             for _ in range(rng.integers(4))
         ),
         pins=tuple(PinSpec(**region(False)) for _ in range(rng.integers(4))),
-        graph=GraphOptions(**maybe(rule="paper", epsilon=0.1 / 3, k=20, cut=pairs, add=pairs)),
-        solver=SolverSpec(**maybe(kind="local-global", tolerance=1e-5 / 3, iterations=3, smoothness=0.0)),
-        free_radius=radius(),
-        **maybe(method="bbw", adaptation="affine", hops=3, blending="linear"),
+        options=OptionSet(
+            GraphOptions(**maybe(rule="paper", epsilon=0.1 / 3, k=20, cut=pairs, add=pairs, laplacian="robust")),
+            ArapOptions(**maybe(kind="local-global", tolerance=1e-5 / 3, iterations=3, smoothness=0.0)),
+            ReachOptions(radius(ReachOptions.free_radius)),
+            AdaptationOptions(**maybe(adaptation="affine", hops=3)),
+            BbwOptions(**maybe(blending="linear")),
+        ),
+        **maybe(method="bbw"),
     )
 
 
@@ -78,15 +86,15 @@ def test_a_recipe_comes_back_exactly(seed, tmp_path):
 def test_what_is_left_out_takes_its_default():
     recipe = recipe_from_json({"version": 1, "handles": [BALL]})
     assert recipe == Recipe(handles=(HandleSpec("handle 1", (0, 0, 0), 1),))
-    assert recipe.graph == GraphOptions("touch", 0.005, 30)
-    assert recipe.solver == SolverSpec("converged", 1e-4, 10, 0.001)
-    assert math.isnan(recipe.free_radius)
-    assert math.isnan(recipe.handles[0].cage_radius)
+    assert recipe.options[GraphOptions] == GraphOptions("touch", 0.005, 30)
+    assert recipe.options[ArapOptions] == ArapOptions("converged", 1e-4, 10, 0.001)
+    assert recipe.options[ReachOptions].free_radius == ShareOfSize(0.5)
+    assert recipe.handles[0].cage_radius == ShareOfSize(0.3)
 
 
 def test_null_frees_everything():
     recipe = recipe_from_json({"version": 1, "free_radius": None, "handles": [{**BALL, "cage_radius": None}]})
-    assert recipe.free_radius is None
+    assert recipe.options[ReachOptions].free_radius is None
     assert recipe.handles[0].cage_radius is None
 
 
@@ -103,8 +111,10 @@ def test_the_documented_recipe_is_read():
     handle = HandleSpec("hand", (1, 2, 3), 0.5, translate=(0, 0, 1), scale=1.5, cage_radius=0.7)
     assert recipe.handles == (handle,)
     assert recipe.pins == (PinSpec(rows=(5, 6)),)
-    assert recipe.graph.cut == ((1, 2),)
-    assert (recipe.hops, recipe.blending, recipe.solver.kind) == (2, "linear", "libigl")
+    options = recipe.options
+    assert options[GraphOptions].cut == ((1, 2),)
+    assert options[AdaptationOptions] == AdaptationOptions("affine", 2)
+    assert (options[BbwOptions].blending, options[ArapOptions].kind) == ("linear", "libigl")
 
 
 @pytest.mark.parametrize(
@@ -235,17 +245,10 @@ def test_rotations_are_normalised(length):
 
 def test_a_pose_turns_and_scales_about_the_center():
     half = math.sqrt(0.5)
-    handle = HandleSpec("a", (1.0, 2.0, 3.0), 1.0, translate=(10.0, 0, 0), rotate=(half, 0, 0, half), scale=2.0)
-    T = handle.transform()
+    pose = HandleSpec("a", (1.0, 2.0, 3.0), 1.0, translate=(10.0, 0, 0), rotate=(half, 0, 0, half), scale=2.0).pose
+    T = pose.matrix(np.array([1.0, 2.0, 3.0]))
     np.testing.assert_allclose(T @ [1, 2, 3, 1], [11, 2, 3, 1], atol=1e-12)
     # A quarter turn about z takes x to y.
     np.testing.assert_allclose(T @ [2, 2, 3, 1], [11, 4, 3, 1], atol=1e-12)
-    stretched = HandleSpec("a", (0.0, 0, 0), 1.0, rotate=(half, 0, 0, half), scale=(3.0, 1.0, 1.0)).transform()
+    stretched = Pose(rotate=(half, 0, 0, half), scale=(3.0, 1.0, 1.0)).matrix(np.zeros(3))
     np.testing.assert_allclose(stretched @ [1, 0, 0, 1], [0, 3, 0, 1], atol=1e-12)
-
-
-def test_rows_without_a_center_turn_about_the_one_given():
-    handle = HandleSpec("a", rows=(1, 2), scale=2.0)
-    np.testing.assert_allclose(handle.transform([1, 1, 1]) @ [2, 1, 1, 1], [3, 1, 1, 1], atol=1e-12)
-    with pytest.raises(ValueError, match="no center"):
-        handle.transform()

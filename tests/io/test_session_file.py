@@ -6,8 +6,11 @@ import random
 import numpy as np
 import pytest
 
+from splap_editor.core.adaptation.options import AdaptationOptions
 from splap_editor.core.graph.options import GraphOptions
-from splap_editor.io.recipe import HandleSpec, PinSpec, PoseSpec, Recipe
+from splap_editor.core.options import OptionSet
+from splap_editor.core.pose import Pose
+from splap_editor.io.recipe import HandleSpec, PinSpec, Recipe
 from splap_editor.io.session_file import (
     SessionFileError,
     content_hash,
@@ -25,22 +28,21 @@ MASKS = ("selection", "hidden")
 def full_session(n=1003) -> SessionFile:
     """A session with every field away from its default, and numbers that need all their digits."""
     rng = np.random.default_rng(2)
-    turn = PoseSpec((0.1, 1 / 3, -2e-17), (0.6, 0.0, 0.8, 0.0), (1.1, 0.7, 1 / 7))
+    turn = Pose((0.1, 1 / 3, -2e-17), (0.6, 0.0, 0.8, 0.0), (1.1, 0.7, 1 / 7))
     return SessionFile(
         PlySpec("../captures/bänk.ply", "blake2b:00ff", n, "pgsr"),
         Recipe(
             method="bbw",
-            graph=GraphOptions(cut=((1, 2),), add=((7, 3),)),
+            options=OptionSet(GraphOptions(cut=((1, 2),), add=((7, 3),)), AdaptationOptions(hops=2)),
             handles=(
                 HandleSpec("arm", (0.1, 0.2, 0.3), 0.25, translate=(1e-300, 2.0, 3.0)),
                 HandleSpec("leg", (1.0, 2.0, 3.0), rows=(4, 9, 1002), rotate=(0.0, 1.0, 0.0, 0.0), scale=1.5),
             ),
             pins=(PinSpec(rows=(0, 1)),),
-            hops=2,
         ),
         (HandleSettings(7, "#ff0001"), HandleSettings(3, "#00ff02", False)),
         (3,),
-        TimelineSpec((KeySpec(1, {7: turn, 3: PoseSpec()}), KeySpec(30, {3: turn})), 12, 48, 29.97, False, False),
+        TimelineSpec((KeySpec(1, {7: turn, 3: Pose()}), KeySpec(30, {3: turn})), 12, 48, 29.97, False, False),
         ViewSpec((1.0, 2.0, 1 / 3), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 28.0, True, False, (0.0, -1.0, 0.0)),
         {"mode": "points", "size_factor": 0.3, "tints": False, "n": 3},
         rng.random(n) < 0.5,

@@ -7,7 +7,7 @@ import pytest
 
 from splap_editor.core.graph.ellipse_offset import normal_offsets, touch_scales
 from splap_editor.core.graph.splat_graph import GraphOptions, splat_graph
-from splap_editor.engine.pipeline import surface_of
+from splap_editor.engine.surface import surface_of
 from splap_editor.io.ply import read_ply
 from splap_editor.resources import resource
 from splap_editor.session.cards import edge_card, has_edge, splat_card

@@ -103,7 +103,7 @@ def assert_same_edit(a, b):
         np.testing.assert_array_equal(left.center, right.center)
         np.testing.assert_array_equal(left.rows, right.rows)
         assert left.rows is not None or left.radius == right.radius
-    assert (a.timeline, a.graph, a.solver, a.method) == (b.timeline, b.graph, b.solver, b.method)
+    assert (a.timeline, a.options, a.method) == (b.timeline, b.options, b.method)
 
 
 def test_a_saved_session_opens_as_it_was(desk, tmp_path):

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from splap_editor.cli import main
 from splap_editor.core.graph.ellipse_offset import touch_scales
 from splap_editor.core.graph.splat_graph import GraphOptions, mended_graph, splat_graph
+from splap_editor.core.options import OptionSet
 from splap_editor.core.splats.occupancy import occupancy_ellipses
 from splap_editor.engine.edit import Edit
 from splap_editor.engine.recipe_edit import edit_of, recipe_of
@@ -121,7 +122,7 @@ def test_mends_come_back_from_a_recipe_and_the_command_line_honours_them(tube, t
     pairs = [tuple(ellipses.rows[pair].tolist()) for pair in graph.edges[::500]]
     options = with_added(with_cut(GraphOptions(), pairs), [(int(ellipses.rows[0]), int(ellipses.rows[900]))])
     recipe, out = tmp_path / "edit.json", tmp_path / "out.ply"
-    write_recipe(recipe, recipe_of(Edit(graph=options)))
+    write_recipe(recipe, recipe_of(Edit(options=OptionSet(options))))
     assert json.loads(recipe.read_text())["graph"].keys() == {"cut", "add"}
     assert edit_of(read_recipe(recipe), read_ply(TUBE).splats).graph == options
     command = ["deform", str(TUBE), "--recipe", str(recipe), "-o", str(out), "--quiet", "--columns", "degree"]

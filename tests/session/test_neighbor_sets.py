@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from splap_editor.core.graph.splat_graph import GraphOptions
-from splap_editor.engine.pipeline import Surface, surface_of
+from splap_editor.engine.surface import Surface, surface_of
 from splap_editor.io.ply import read_ply
 from splap_editor.resources import resource
 from splap_editor.session.neighbor_sets import NEIGHBOR_KINDS, NORMAL_SHARE, compared, neighbor_set

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from splap_editor.core.handle_nodes import Region
+from splap_editor.core.pose import Pose
 from splap_editor.core.splats.occupancy import occupancy_ellipses
 from splap_editor.core.splats.symmetry import Plane, object_center
 from splap_editor.engine.edit import Edit, Handle
-from splap_editor.engine.pose import Pose
 from splap_editor.io.ply import read_ply
 from splap_editor.resources import resource
 from splap_editor.session.pose_tools import (

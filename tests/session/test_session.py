@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from splap_editor.cli import main as command_line
+from splap_editor.core.bbw.options import BbwOptions
+from splap_editor.core.reach_options import ReachOptions
 from splap_editor.engine import surface_stages
 from splap_editor.engine.cache import StageCache
 from splap_editor.engine.edit import Pose
@@ -245,9 +247,7 @@ def test_every_job_can_be_cancelled_and_leaves_everything_as_it_was(kind, main, 
     out = tmp_path / "out.ply"
     out.write_bytes(b"what was there")
     if kind == "bind":
-        monkeypatch.setattr(
-            work, "deformer_of", lambda *args, progress, **more: waits_until_cancelled(started, progress)
-        )
+        monkeypatch.setattr(work, "bind", lambda *args, progress, **more: waits_until_cancelled(started, progress))
         opened.change_edit(replace(edit, method="bbw"), "Change method")
     elif kind == "pose":
         solve = lambda transforms, *, progress, shown: waits_until_cancelled(started, progress)  # noqa: E731
@@ -299,7 +299,7 @@ def test_a_second_file_cancels_the_preparing_of_the_first(main, session, monkeyp
 
 def test_a_handle_placed_on_a_moved_part_moves_nothing(main, opened):
     # A second handle frees what lies around it, so all is free from the start.
-    opened.change_edit(replace(opened.scene.edit, free_radius=None), "Free everything")
+    opened.change_edit(opened.scene.edit.with_options(ReachOptions(None)), "Free everything")
     bent(main, opened)
     scene = opened.scene
     before = scene.kernels.means.copy()
@@ -325,7 +325,7 @@ def test_a_disabled_handle_lets_go(main, opened):
 def test_changing_the_graph_prepares_anew(main, opened):
     bent(main, opened)
     edit = opened.scene.edit
-    opened.change_edit(replace(edit, graph=replace(edit.graph, k=12)), "Change graph")
+    opened.change_edit(edit.with_options(replace(edit.graph, k=12)), "Change graph")
     main.run_until(lambda: opened.state == "settled")
     assert opened.scene.surface.options.k == 12
 
@@ -374,8 +374,8 @@ def test_weights_found_before_are_not_solved_for_again(main, opened, monkeypatch
     def refuse(*_, **__):
         raise AssertionError("solved although the cache has it")
 
-    monkeypatch.setattr("splap_editor.engine.bbw_binding.handle_weight", refuse)
-    opened.change_edit(replace(opened.scene.edit, blending="linear"), "Change blending")
+    monkeypatch.setattr("splap_editor.core.bbw.binding.handle_weight", refuse)
+    opened.change_edit(opened.scene.edit.with_options(BbwOptions(blending="linear")), "Change blending")
     main.run_until(lambda: opened.state == "settled")
     assert opened.failures == []
     assert opened.bound.deformer is not kept
@@ -395,7 +395,7 @@ def test_cancelling_the_weights_leaves_scene_and_cache_as_they_were(main, opened
         raise AssertionError("it was to be cancelled")
 
     with monkeypatch.context() as patched:
-        patched.setattr("splap_editor.engine.bbw_binding.handle_weight", slow)
+        patched.setattr("splap_editor.core.bbw.binding.handle_weight", slow)
         opened.change_edit(
             replace(scene.edit, handles=tuple(replace(h, cage_radius=None) for h in scene.edit.handles)), "Change cage"
         )

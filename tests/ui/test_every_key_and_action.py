@@ -11,8 +11,8 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from splap_editor.core.handle_nodes import Region
+from splap_editor.core.pose import Pose
 from splap_editor.engine.keyframes import edit_at_frame, keyed_edit
-from splap_editor.engine.pose import Pose
 from splap_editor.tools.tool_table import TOOLS
 from splap_editor.ui.actions.action_table import ACTIONS
 

@@ -7,10 +7,10 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
+from splap_editor.core.arap.options import ArapOptions
 from splap_editor.core.handle_nodes import Region
+from splap_editor.core.reach_options import ReachOptions
 from splap_editor.engine.edit import Pose
-from splap_editor.io.recipe import SolverSpec
-from splap_editor.ui.panels.deformer_panel import SOLVER_HINTS
 from splap_editor.ui.panels.pose_form import PoseForm, euler_degrees, quat_of_euler
 from splap_editor.ui.widgets.number_field import NumberField, ScrubLabel
 from splap_editor.ui.widgets.options_form import OptionsForm
@@ -72,13 +72,13 @@ def test_a_label_dragged_sideways_changes_its_number(qtbot):
 
 
 def test_an_options_form_gives_a_changed_copy(qtbot):
-    form = OptionsForm(SolverSpec(), SOLVER_HINTS)
+    form = OptionsForm(ArapOptions())
     qtbot.addWidget(form)
     told = []
     form.changed.connect(told.append)
     form.findChild(NumberField, "tolerance").setValue(0.01)
-    assert told == [replace(SolverSpec(), tolerance=0.01)]
-    form.show_value(SolverSpec(kind="libigl"))
+    assert told == [replace(ArapOptions(), tolerance=0.01)]
+    form.show_value(ArapOptions(kind="libigl"))
     assert form.findChild(NumberField, "tolerance").isHidden()
     assert not form.findChild(NumberField, "iterations").isHidden()
     assert len(told) == 1
@@ -118,13 +118,13 @@ def test_method_and_options_are_undoable_steps(driver):
     panel, session = driver.window.deformer_panel, driver.session
     panel.method.setCurrentIndex(1)
     assert driver.scene.edit.method == "bbw"
-    assert panel.solver.isHidden()
+    assert panel.forms[ArapOptions].isHidden()
     session.history.undo()
     assert driver.scene.edit.method == "arap"
     panel.free_radius.setValue(0.5)
-    assert driver.scene.edit.free_radius == 0.5
+    assert driver.scene.edit.options[ReachOptions].free_radius == 0.5
     panel.whole.click()
-    assert driver.scene.edit.free_radius is None
+    assert driver.scene.edit.options[ReachOptions].free_radius is None
 
 
 def test_the_scene_panel_says_what_is_open(driver):

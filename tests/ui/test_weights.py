@@ -6,6 +6,8 @@ from PySide6.QtTest import QTest
 from scipy.spatial import cKDTree
 
 from splap_editor.cli import main as command_line
+from splap_editor.core.bbw.options import BbwOptions
+from splap_editor.core.reach_options import CageOptions
 from splap_editor.engine.edit import Pose
 from splap_editor.io.ply import read_ply
 from splap_editor.resources import resource
@@ -116,7 +118,7 @@ def test_a_typed_radius_is_outlined_while_it_is_typed(driver):
     form.radius.selectAll()
     QTest.keyClicks(form.radius.lineEdit(), "0.2")
     assert np.isclose(driver.window.view.viewport.cage.radius, 0.2)
-    assert np.isnan(driver.scene.edit.handles[0].cage_radius)
+    assert driver.scene.edit.handles[0].cage_radius == CageOptions.cage_radius
     QTest.keyClick(form.radius, Qt.Key.Key_Return)
     assert driver.scene.edit.handles[0].cage_radius == 0.2
     driver.wait_idle()
@@ -124,13 +126,13 @@ def test_a_typed_radius_is_outlined_while_it_is_typed(driver):
 
 def test_blending_is_an_undoable_option_of_the_weights(driver):
     placed(driver)
-    form = driver.window.deformer_panel.kernels
+    form = driver.window.deformer_panel.forms[BbwOptions]
     box = form._editors["blending"]
     assert not box.isHidden()
     box.setCurrentIndex(box.findData("linear"))
-    assert driver.scene.edit.blending == "linear"
+    assert driver.scene.edit.options[BbwOptions].blending == "linear"
     driver.session.history.undo()
-    assert driver.scene.edit.blending == "dual-quaternion"
+    assert driver.scene.edit.options[BbwOptions].blending == "dual-quaternion"
     driver.wait_idle()
 
 

@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
 
-from splap_editor.engine.pose import Pose
-from splap_editor.io.recipe_specs import SCALES
+from splap_editor.core.pose import SCALES, Pose
 from splap_editor.viewport.camera import turn
 from splap_editor.viewport.gizmo import Gizmo
 from splap_editor.viewport.gizmo_parts import (

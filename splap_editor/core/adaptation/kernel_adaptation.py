@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,12 +9,11 @@ from numpy.typing import NDArray
 from splap_editor.core.adaptation.carried_ellipses import KernelArrays, adapt_inert, write_kernels
 from splap_editor.core.adaptation.kernel_binding import KernelBinding
 from splap_editor.core.adaptation.node_motions import STILL_SHARE, find_motions, find_moved, find_ring_motions
+from splap_editor.core.adaptation.options import AdaptationOptions
 from splap_editor.core.deformer import Deformation
 from splap_editor.core.splats.rotations import matrices_to_quats, quat_products
 from splap_editor.core.splats.spherical_harmonics import rotated_sh
 from splap_editor.core.splats.splats import Splats
-
-AdaptationMethod = Literal["surface", "affine", "none"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +115,7 @@ def adapt_kernels(
     binding: KernelBinding,
     deformation: Deformation,
     *,
-    method: AdaptationMethod = "surface",
+    method: str = "surface",
     hops: int = 1,
     out: AdaptedKernels | None = None,
 ) -> AdaptedKernels:
@@ -143,7 +141,8 @@ def adapt_kernels(
         Carriers of the scene.
     deformation : Deformation
         Where its n nodes went and how they turned.
-    method : "surface", "affine" or "none"
+    method : str
+        One of `ADAPTATIONS`.
         See above.
     hops : int
         Rings of graph neighbours for "affine", 1 to 3.
@@ -241,10 +240,7 @@ def adapted_splats(splats: Splats, adapted: AdaptedKernels) -> Splats:
 
 def _validate(binding, deformation, method, hops):
     n = binding.ellipses.n_nodes
-    if method not in ("surface", "affine", "none"):
-        raise ValueError(f"adaptation method must be 'surface', 'affine' or 'none', got {method!r}")
-    if method == "affine" and hops not in (1, 2, 3):
-        raise ValueError(f"hops must be 1, 2 or 3, got {hops}")
+    AdaptationOptions(method, hops)
     if method == "affine" and binding.graph is None:
         raise ValueError("affine adaptation needs a KernelBinding made with the splat graph")
     if np.shape(deformation.positions) != (n, 3):

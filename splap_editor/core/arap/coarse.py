@@ -7,8 +7,9 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from splap_editor.core.arap.local_kernels import blend_rigid
-from splap_editor.core.arap.problem import FREE, PIN, ArapProblem, Constraints, Pose, edge_weights
+from splap_editor.core.arap.problem import ArapProblem, Constraints, Pose, edge_weights
 from splap_editor.core.arap.rigid_parts import LooseParts
+from splap_editor.core.deformer import FREE, PIN
 from splap_editor.core.graph.splat_graph import SplatGraph
 from splap_editor.core.splats.rotations import matrices_to_quats
 from splap_editor.core.surface.node_sampling import farthest_nodes, nearest_samples

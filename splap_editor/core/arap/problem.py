@@ -14,14 +14,9 @@ from splap_editor.core.arap.local_kernels import (
     write_global_rhs,
 )
 from splap_editor.core.arap.rotation_fit import nearest_rotations
+from splap_editor.core.deformer import FREE
 from splap_editor.core.index_spaces import Nodes, ProblemRows
 from splap_editor.core.linear_solvers import SpdFactor
-
-PIN = -1
-"""Label of a node that stays where it is."""
-
-FREE = -2
-"""Label of a node that nothing holds."""
 
 
 def edge_weights(L: sp.spmatrix | sp.sparray) -> sp.csr_matrix:

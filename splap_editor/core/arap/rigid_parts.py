@@ -4,8 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from splap_editor.core.arap.problem import PIN, Constraints, Pose
+from splap_editor.core.arap.problem import Constraints, Pose
 from splap_editor.core.arap.rotation_fit import nearest_rotations
+from splap_editor.core.deformer import PIN
 
 _ANCHORS = 16
 """At most so many neighbouring nodes tell a loose part how to move."""

@@ -14,15 +14,15 @@ from scipy.spatial import cKDTree
 
 from splap_editor.core.bbw.blending import blended_dual_quaternion, blended_linear
 from splap_editor.core.bbw.box_qp import BoxQpReport
+from splap_editor.core.bbw.options import BbwOptions
 from splap_editor.core.bbw.weights import (
     DEFAULT_OPTIONS,
-    BbwOptions,
     BbwProblem,
     HandleWeight,
     bbw_problem,
     handle_weight,
 )
-from splap_editor.core.deformer import Deformation, Handles, Shown
+from splap_editor.core.deformer import FREE, PIN, Deformation, Handles, Shown
 from splap_editor.core.progress import Progress, no_progress, part_of
 
 if TYPE_CHECKING:
@@ -93,12 +93,12 @@ def bbw_weights(
     values = np.concatenate([s.values for s in solved]) if solved else np.zeros(0)
     weights = sp.csr_array((values, (rows, columns)), shape=(len(problem.rest), n_handles))
     sums = weights.sum(axis=1)
-    held = (problem.labels == -1) | ((problem.labels < 0) & ~problem.in_cages.any(axis=0))
+    held = (problem.labels == PIN) | ((problem.labels < 0) & ~problem.in_cages.any(axis=0))
     rested = np.isin(problem.components, problem.components[held])
     divisors = np.where(rested | (sums == 0), np.maximum(sums, 1.0), sums)
     weights = sp.csr_array(sp.diags_array(1.0 / divisors) @ weights)
 
-    constrained = np.unique(problem.components[problem.labels > -2])
+    constrained = np.unique(problem.components[problem.labels != FREE])
     unconstrained = ~np.isin(problem.components, constrained)
     sizes = np.bincount(problem.components, minlength=1)
     specks = unconstrained & (sizes[problem.components] < problem.options.speck_size)

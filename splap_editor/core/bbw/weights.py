@@ -2,7 +2,6 @@
 
 import time
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 import scipy.sparse as sp
@@ -12,45 +11,12 @@ from scipy.spatial import cKDTree
 
 from splap_editor.core.bbw.box_qp import BoxQpReport, box_qp
 from splap_editor.core.bbw.levels import Level, coarser_level, prolonged
-from splap_editor.core.deformer import Handles
+from splap_editor.core.bbw.options import BbwOptions
+from splap_editor.core.deformer import FREE, Handles
 from splap_editor.core.progress import Progress, no_progress, part_of
-
-_FREE, _PIN = -2, -1
 
 CHEAP_UNKNOWNS = 10_000
 """So many take a few hundredths of a second to factorise."""
-
-
-@dataclass(frozen=True)
-class BbwOptions:
-    """How bounded biharmonic weights are found and used.
-
-    Parameters
-    ----------
-    blending : {"dual-quaternion", "linear"}
-        How the handles' transforms are mixed at a drag; see `blending.blended`. The weights do not depend on it.
-    tolerance : float
-        Change of the weights at which their solution stops, a tenth of it up to `CHEAP_UNKNOWNS`. They are then a few
-        times that from the optimum, farther only in fringes that hang on by a few weak links, where the energy hardly
-        tells one value from another.
-    max_factorisations : int
-        Sparse factorisations per handle before the interior-point fallback.
-    mass_floor : float
-        Smallest mass in units of the median one; tiny areas would make ``M⁻¹`` explode.
-    speck_size : int
-        Components of fewer nodes, and without any constraint, follow their nearest neighbour instead of staying
-        at rest.
-    """
-
-    blending: Literal["dual-quaternion", "linear"] = "dual-quaternion"
-    tolerance: float = 2e-4
-    max_factorisations: int = 60
-    mass_floor: float = 0.1
-    speck_size: int = 30
-
-    def __post_init__(self):
-        if self.blending not in ("dual-quaternion", "linear"):
-            raise ValueError(f"blending must be 'dual-quaternion' or 'linear', got {self.blending!r}")
 
 
 DEFAULT_OPTIONS = BbwOptions()
@@ -70,7 +36,7 @@ class BbwProblem:
     energies : tuple of (n_l, n_l) sparse float64
         ``Lᵀ M⁻¹ L`` of each level.
     labels : (n,) int32
-        Handle of each scene node, -1 for a pin, -2 for the unconstrained.
+        Handle of each scene node, `PIN` and `FREE` for the others.
     in_cages : (H, n) bool
         Whether each scene node is no farther than the cage radius from the nearest node of each handle.
     components : (n,) int32
@@ -156,7 +122,7 @@ def bbw_problem(
     n = len(rest)
     _check_shapes(n, L, M, handles)
     L = sp.csr_array(L)
-    labels = np.full(n, _FREE, np.int32)
+    labels = np.full(n, FREE, np.int32)
     labels[handles.indices] = handles.labels
     positive = M[M > 0]
     M = np.maximum(M, options.mass_floor * (np.median(positive) if len(positive) else 1.0))
@@ -171,7 +137,7 @@ def bbw_problem(
     progress(0.3)
     # Below a few thousand unknowns the factorisations are cheap enough to start cold.
     while levels[-1].n_nodes > 3000:
-        level = coarser_level(levels[-1], labels[levels[-1].nodes] != _FREE)
+        level = coarser_level(levels[-1], labels[levels[-1].nodes] != FREE)
         if level.n_nodes > 0.6 * levels[-1].n_nodes:
             break
         levels.append(level)
@@ -237,7 +203,7 @@ def handle_weight(problem: BbwProblem, handle: int, progress: Progress = no_prog
         values=values[kept],
         qp=solution.report,
         n_unknowns=len(free),
-        n_reached=int(np.count_nonzero(problem.labels[nodes] == _FREE)),
+        n_reached=int(np.count_nonzero(problem.labels[nodes] == FREE)),
         n_coarse_factorisations=n_coarse,
         seconds=time.perf_counter() - began,
     )
@@ -254,7 +220,7 @@ def _level_weight(problem, k, handle, in_cage, start, progress):
     # Where nothing asks for zero the optimum is one; the solver would find that from an ill-conditioned system.
     components = problem.components[level.nodes]
     reached = np.isin(components, components[own])
-    free = in_cage & (labels == _FREE) & reached
+    free = in_cage & (labels == FREE) & reached
     zero = reached & ~free & (labels != handle)
     tethered = np.isin(components, components[zero])
     values[free & ~tethered] = 1.0

@@ -67,7 +67,7 @@ def has_hidden(state: State) -> bool:
 
 def has_weights(state: State) -> bool:
     """Handles have weights to be shown."""
-    return has_handles(state) and state.scene.edit.method == "bbw"
+    return has_handles(state) and state.scene.edit.deformer.has_weights
 
 
 def has_handles(state: State) -> bool:

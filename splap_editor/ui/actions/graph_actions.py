@@ -130,7 +130,7 @@ class GraphActions:
         self._change(with_cut(self._options, pairs), label)
 
     def _change(self, options: GraphOptions, label: str) -> None:
-        self._session.change_edit(replace(self._session.scene.edit, graph=options), label)
+        self._session.change_edit(self._session.scene.edit.with_options(options), label)
 
     def _forget(self) -> None:
         self.kept = None

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from splap_editor.core.pose import Pose
 from splap_editor.core.splats.symmetry import Plane, object_center, symmetry_plane
-from splap_editor.engine.pose import Pose
 from splap_editor.session.jobs import Job
 from splap_editor.session.pose_tools import NoMirrorImageError, mirrored_handles, pasted_poses
 from splap_editor.session.scene_follower import SceneFollower

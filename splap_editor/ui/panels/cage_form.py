@@ -3,6 +3,8 @@
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QCheckBox, QGridLayout, QWidget
 
+from splap_editor.core.options import options_of, world_length
+from splap_editor.core.reach_options import CageOptions
 from splap_editor.ui.theme import STEP
 from splap_editor.ui.widgets.number_field import NumberField, ScrubLabel
 from splap_editor.ui.widgets.options_form import LABEL_PX
@@ -23,7 +25,7 @@ class CageForm(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.radius = NumberField(SMALLEST, 1e9, decimals=6, step=0.05)
-        self.radius.setToolTip("Splats farther than this from the handle's own do not follow it, in the file's units.")
+        self.radius.setToolTip(options_of(CageOptions)["cage_radius"].sentence)
         self.radius.committed.connect(lambda radius: self.changed.emit(radius))
         self.radius.lineEdit().textEdited.connect(self._on_typed)
         self.grip = ScrubLabel("Cage", self.radius)
@@ -31,7 +33,7 @@ class CageForm(QWidget):
         self.grip.moved.connect(self._on_scrubbed)
         self.grip.finished.connect(lambda: self.changed.emit(self.radius.value()))
         self.whole = QCheckBox("Reaches the whole object", toolTip="No cage: the weight fades over all of it.")
-        self.whole.clicked.connect(lambda on: self.changed.emit(None if on else float("nan")))
+        self.whole.clicked.connect(lambda on: self.changed.emit(None if on else CageOptions.cage_radius))
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setHorizontalSpacing(2 * STEP)
@@ -47,7 +49,7 @@ class CageForm(QWidget):
         self.whole.setChecked(radius is None)
         for part in (self.grip, self.radius):
             part.setEnabled(radius is not None)
-        self.radius.show_value(0.3 * unit if radius is None else radius)
+        self.radius.show_value(world_length(CageOptions.cage_radius if radius is None else radius, unit))
 
     def _on_scrubbed(self, radius: float) -> None:
         self.radius.show_value(radius)

@@ -1,11 +1,15 @@
 """Which deformer bends the splats, its options, and how far it is."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from PySide6.QtCore import QEvent, QObject, Signal
 from PySide6.QtWidgets import QCheckBox, QGridLayout, QLabel, QVBoxLayout, QWidget
 
+from splap_editor.core.adaptation.options import AdaptationOptions
+from splap_editor.core.deformers import DEFORMERS, method_titles
+from splap_editor.core.options import options_of, world_length
+from splap_editor.core.reach_options import ReachOptions
 from splap_editor.engine.edit import Edit
 from splap_editor.session.scene import Scene
 from splap_editor.session.scene_follower import SceneFollower
@@ -14,66 +18,9 @@ from splap_editor.ui.panels.weights_form import WeightsForm
 from splap_editor.ui.theme import STEP
 from splap_editor.ui.widgets.choices import Choice
 from splap_editor.ui.widgets.number_field import NumberField, set_tone
-from splap_editor.ui.widgets.options_form import FieldHint, OptionsForm, form_label
+from splap_editor.ui.widgets.options_form import OptionsForm, form_label
 
-METHODS = {"arap": "As-rigid-as-possible", "bbw": "Bounded biharmonic weights"}
-
-SOLVER_HINTS = {
-    "kind": FieldHint(
-        "Solver",
-        "Converged gives the settled shape; the others are the published iterations, for comparison.",
-        choices={"converged": "Converged", "local-global": "Local/global steps", "libigl": "libigl (reference)"},
-    ),
-    "tolerance": FieldHint(
-        "Tolerance",
-        "Settled once no splat moves by more than this share of the size.",
-        low=1e-6,
-        high=0.1,
-        step=1e-4,
-        decimals=6,
-        only_for=("kind", ("converged",)),
-    ),
-    "iterations": FieldHint(
-        "Iterations", "Steps from rest.", low=1, high=10_000, only_for=("kind", ("local-global", "libigl"))
-    ),
-    "smoothness": FieldHint(
-        "Stiffness",
-        "How much neighbouring splats want to turn together.",
-        low=0.0,
-        high=10.0,
-        step=0.001,
-        decimals=4,
-        only_for=("kind", ("converged",)),
-    ),
-}
-
-
-@dataclass(frozen=True)
-class KernelOptions:
-    """The part of an edit that says how splats follow the surface."""
-
-    adaptation: str
-    hops: int
-    blending: str
-
-
-KERNEL_HINTS = {
-    "adaptation": FieldHint(
-        "Splat shape",
-        "How each ellipse follows the bent surface.",
-        choices={"surface": "Follows the surface", "affine": "Stretches with it", "none": "Moves only"},
-    ),
-    "hops": FieldHint(
-        "Neighbours",
-        "Rings of neighbours that the stretch is taken from.",
-        low=1,
-        high=4,
-        only_for=("adaptation", ("affine",)),
-    ),
-    "blending": FieldHint(
-        "Blending", "How turns of several handles mix.", choices={"dual-quaternion": "Keeps volume", "linear": "Linear"}
-    ),
-}
+_REACH = options_of(ReachOptions)["free_radius"]
 
 
 class DeformerPanel(QWidget):
@@ -91,31 +38,22 @@ class DeformerPanel(QWidget):
         self.timing = QLabel()
         self.timing.setProperty("tone", "quiet")
         self.method = Choice()
-        for name, words in METHODS.items():
+        for name, words in method_titles().items():
             self.method.addItem(words, name)
         self.method.currentIndexChanged.connect(
             lambda index: self._change("Change method", method=self.method.itemData(index))
         )
-        self.solver = OptionsForm(edit.solver, SOLVER_HINTS)
-        self.solver.changed.connect(lambda solver: self._change("Change solver", solver=solver))
-        self.kernels = OptionsForm(_kernel_options(edit), KERNEL_HINTS)
-        self.kernels.changed.connect(
-            lambda options: self._change(
-                "Change splat shape",
-                adaptation=options.adaptation,
-                hops=options.hops,
-                blending=options.blending,
-            )
-        )
+        self.forms = {group: self._form(group, edit) for group in dict.fromkeys(row.options for row in DEFORMERS)}
+        self.kernels = self._form(AdaptationOptions, edit)
         self.weights = WeightsForm(session)
         self.whole = QCheckBox(
             "Bend the whole object", toolTip="Otherwise only what lies within the free radius moves."
         )
         self.whole.clicked.connect(self._on_whole_clicked)
         self.free_radius = NumberField(0.0, 1e9, decimals=4, step=0.05)
-        self.free_radius.setToolTip("Splats farther from every handle than this stay put, in the file's units.")
-        self.free_radius.committed.connect(lambda radius: self._change("Change free radius", free_radius=radius))
-        self._radius_label = form_label("Free radius", self.free_radius)
+        self.free_radius.setToolTip(_REACH.sentence)
+        self.free_radius.committed.connect(lambda radius: self._take(ReachOptions(radius), _REACH.label))
+        self._radius_label = form_label(_REACH.label, self.free_radius)
         self.free_radius.installEventFilter(self)
         reach = QGridLayout()
         reach.setHorizontalSpacing(2 * STEP)
@@ -126,7 +64,7 @@ class DeformerPanel(QWidget):
         reach.addWidget(self.whole, 1, 0, 1, 2)
         layout = QVBoxLayout(self)
         layout.setSpacing(2 * STEP)
-        for part in (self.state, self.timing, self.method, self.solver):
+        for part in (self.state, self.timing, self.method, *self.forms.values()):
             layout.addWidget(part)
         layout.addLayout(reach)
         layout.addWidget(self.kernels)
@@ -186,30 +124,36 @@ class DeformerPanel(QWidget):
         self.method.blockSignals(True)
         self.method.setCurrentIndex(self.method.findData(edit.method))
         self.method.blockSignals(False)
-        is_arap = edit.method == "arap"
-        self.solver.setVisible(is_arap)
-        self.solver.show_value(edit.solver)
-        self.kernels.show_value(_kernel_options(edit))
-        self.kernels.show_field("blending", not is_arap)
-        self.weights.setVisible(not is_arap)
-        self.whole.setVisible(is_arap)
-        self.whole.setChecked(edit.free_radius is None)
+        row, free = edit.deformer, edit.options[ReachOptions].free_radius
+        for group, form in self.forms.items():
+            form.setVisible(group is row.options)
+            form.show_value(edit.options[group])
+        self.kernels.show_value(edit.options[AdaptationOptions])
+        self.weights.setVisible(row.has_weights)
+        self.whole.setVisible(row.has_free_radius)
+        self.whole.setChecked(free is None)
         for part in (self.free_radius, self._radius_label):
-            part.setVisible(is_arap)
-            part.setEnabled(edit.free_radius is not None)
+            part.setVisible(row.has_free_radius)
+            part.setEnabled(free is not None)
         size = self._scene.ellipses.scene_scale if self._scene is not None else 1.0
-        radius = 0.5 * size if edit.free_radius is None or np.isnan(edit.free_radius) else edit.free_radius
+        radius = world_length(_REACH.default if free is None else free, size)
         self.free_radius.setSingleStep(0.05 * size)
         self.free_radius.show_value(radius)
         self.show_state()
 
+    def _form(self, group: type, edit: Edit) -> OptionsForm:
+        form = OptionsForm(edit.options[group])
+        title = next(iter(options_of(group).values())).label
+        form.changed.connect(lambda options: self._take(options, title))
+        return form
+
     def _on_whole_clicked(self, whole: bool) -> None:
-        self._change("Change free radius", free_radius=None if whole else float("nan"))
+        self._take(ReachOptions(None if whole else _REACH.default), _REACH.label)
+
+    def _take(self, group: object, what: str) -> None:
+        if self._scene is not None:
+            self._session.change_edit(self._scene.edit.with_options(group), f"Change {what.lower()}")
 
     def _change(self, label: str, **values: object) -> None:
         if self._scene is not None:
             self._session.change_edit(replace(self._scene.edit, **values), label)
-
-
-def _kernel_options(edit: Edit) -> KernelOptions:
-    return KernelOptions(edit.adaptation, edit.hops, edit.blending)

@@ -17,11 +17,11 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from splap_editor.core.options import world_length
 from splap_editor.engine.edit import Handle, Pose
 from splap_editor.session.scene import Scene
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
-from splap_editor.session.weight_report import cage_radius
 from splap_editor.ui.panels.cage_form import CageForm
 from splap_editor.ui.panels.pose_form import PoseForm
 from splap_editor.ui.theme import STEP, icon
@@ -96,10 +96,10 @@ class HandlesPanel(QWidget):
         self.pose_form.setVisible(handle is not None)
         if handle is not None:
             self.pose_form.show_pose(handle.pose, self._scene.ellipses.scene_scale)
-        has_cage = handle is not None and self._scene.edit.method == "bbw"
+        has_cage = handle is not None and self._scene.edit.deformer.has_weights
         self.cage_form.setVisible(has_cage)
         if has_cage:
-            radius = cage_radius(self._scene, handle.cage_radius)
+            radius = world_length(handle.cage_radius, self._scene.ellipses.scene_scale)
             self.cage_form.show_radius(radius, self._scene.ellipses.scene_scale)
 
     def _chosen(self) -> Handle | None:

@@ -41,7 +41,7 @@ class WeightsForm(QWidget):
 
     def _show(self) -> None:
         bound = self._session.bound
-        lines = weight_lines(bound.edit, bound.deformer.report) if bound and bound.edit.method == "bbw" else []
+        lines = weight_lines(bound.edit, bound.deformer.report) if bound and bound.edit.deformer.has_weights else []
         while len(self.labels) < len(lines):
             label = QLabel(wordWrap=True, textInteractionFlags=Qt.TextInteractionFlag.TextSelectableByMouse)
             self._lines.addWidget(label)

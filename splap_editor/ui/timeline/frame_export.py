@@ -14,6 +14,7 @@ from splap_editor.engine.frames import FramePoser, frame_path, frame_poser, writ
 from splap_editor.io.png import write_png
 from splap_editor.session.jobs import Job
 from splap_editor.session.session import Session
+from splap_editor.session.side_by_side import side_by_side
 from splap_editor.viewport.camera import View
 from splap_editor.viewport.studio import Studio, turntable_views
 from splap_editor.viewport.viewport import Viewport
@@ -72,13 +73,14 @@ def submit_frames(
     """
     scene, bound = session.scene, session.bound
     file, edit, surface, cache = scene.file, scene.edit, scene.surface, session.cache
-    deformer = bound.deformer if bound is not None and binds_like(bound.edit, edit) else None
+    n_threads = session.n_threads
+    serves = bound is not None and binds_like(bound.edit, edit)
     desk = _Desk(scene.splats, viewport, order, scene.hidden) if order.kind != "ply" else None
 
     def poser(job: Job) -> FramePoser:
-        if deformer is not None and edit.active_handles:
-            return FramePoser(surface, edit, deformer)
-        return frame_poser(surface, edit, cache=cache, progress=job.progress("binding"))
+        if serves and edit.active_handles:
+            return FramePoser(edit, bound)
+        return frame_poser(surface, edit, cache=cache, progress=job.progress("binding"), run=side_by_side(n_threads))
 
     def work(job: Job) -> list[Path]:
         frames, path = order.frames, order.path

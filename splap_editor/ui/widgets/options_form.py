@@ -69,7 +69,7 @@ def _hint(known: Option) -> FieldHint:
         min(factor * known.most, _WIDEST),
         factor * known.step,
         decimals,
-        None if known.choices is None else {name: choice.label for name, choice in known.choices.items()},
+        {name: choice.label for name, choice in known.choices.items()},
         factor,
         known.only_for,
     )

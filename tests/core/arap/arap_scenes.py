@@ -5,7 +5,8 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial.transform import Rotation
 
-from splap_editor.core.arap.arap import ArapDeformer, ArapOptions
+from splap_editor.core.arap.binding import arap_deformer
+from splap_editor.core.arap.options import ArapOptions
 from splap_editor.core.deformer import Handles
 from splap_editor.core.graph.splat_graph import SplatGraph
 
@@ -25,7 +26,7 @@ class Scene:
 
     def deformer(self, handles, scene=None, **options):
         """A deformer of this scene."""
-        return ArapDeformer(
+        return arap_deformer(
             self.rest, self.L, handles, scene_scale=self.scene_scale, M=self.M, graph=self.graph,
             triangles=self.triangles, options=ArapOptions(**options), scene=scene,
         )  # fmt: skip

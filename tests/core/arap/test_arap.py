@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from splap_editor.core.arap.arap import ArapOptions
+from splap_editor.core.arap.options import ArapOptions
 from splap_editor.core.arap.scene import ArapScene
 from splap_editor.core.deformer import UnconstrainedComponentError
 from splap_editor.core.progress import Cancelled
@@ -359,7 +359,7 @@ def test_rejects_bad_arguments():
         STRIP.deformer(handles).drag(np.full((1, 4, 4), np.nan))
     with pytest.raises(ValueError, match="kind must be"):
         ArapOptions(kind="fast")
-    with pytest.raises(ValueError, match="tolerance must be positive"):
+    with pytest.raises(ValueError, match="tolerance must be a finite number greater than 0"):
         ArapOptions(tolerance=0.0)
     with pytest.raises(ValueError, match="iterations"):
         ArapOptions(iterations=0)

@@ -6,7 +6,8 @@ import pytest
 import scipy.sparse as sp
 
 from splap_editor.core.bbw.bbw import BbwDeformer, bbw_weights
-from splap_editor.core.bbw.weights import BbwOptions, bbw_problem, handle_weight
+from splap_editor.core.bbw.options import BbwOptions
+from splap_editor.core.bbw.weights import bbw_problem, handle_weight
 from splap_editor.core.deformer import Handles
 from splap_editor.core.progress import Cancelled
 from tests.reference.bbw import handles_of, mesh_graph, operators, rigid, sheet, tube, weights_dense

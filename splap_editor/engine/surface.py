@@ -1,45 +1,35 @@
-"""The stages from a file to a pose, and what is kept of them."""
+"""The surface of a scene: every stage from splats to what deformers are bound to, and what is kept of them."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
 from time import perf_counter
+from typing import TypeVar
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels, KernelBinding, adapt_kernels
-from splap_editor.core.arap.arap import ArapDeformer, ArapOptions
-from splap_editor.core.arap.scene import ArapScene
-from splap_editor.core.deformer import Deformation, Deformer, Handles
-from splap_editor.core.graph.splat_graph import GraphOptions, SplatGraph, require_mendable
-from splap_editor.core.handle_nodes import handle_nodes
-from splap_editor.core.progress import Progress
+from splap_editor.core.adaptation.kernel_binding import KernelBinding
+from splap_editor.core.graph.options import GRAPH_RULES, LAPLACIANS, NEIGHBORHOODS, GraphOptions
+from splap_editor.core.graph.splat_graph import SplatGraph, require_mendable
+from splap_editor.core.progress import StageProgress, silent
 from splap_editor.core.splats.occupancy import Ellipses, occupancy_ellipses
 from splap_editor.core.splats.splats import Splats
 from splap_editor.core.surface.geodesics import Neighborhoods
 from splap_editor.engine.cache import StageCache, content_key
-from splap_editor.engine.edit import Edit
+from splap_editor.engine.sources import source_hash
 from splap_editor.engine.surface_stages import (
+    Guard,
     SurfaceStages,
     mended_stages,
     packed_stages,
     plain_stages,
+    unguarded,
     unmended,
     unpacked_stages,
 )
 
-STAGE_VERSION = 1
-"""Raised whenever a cached stage gives other numbers than before."""
-
-StageProgress = Callable[[str], Progress]
-"""Gives the progress callback of a named stage."""
-
-
-def silent(stage: str) -> Progress:
-    """Report no stage."""
-    return lambda share: None
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +54,7 @@ class Surface:
     binding: KernelBinding
     key: str
     timings_s: dict[str, float] = field(default_factory=dict)
+    _shared: dict[Callable, object] = field(default_factory=dict, repr=False)
 
     @property
     def options(self) -> GraphOptions:
@@ -95,10 +86,21 @@ class Surface:
         """(n,) lumped areas."""
         return self.stages.M
 
-    @cached_property
-    def arap_scene(self) -> ArapScene:
-        """What all as-rigid-as-possible handle sets of the scene share; its coarse model is made when first dragged."""
-        return ArapScene(self.ellipses.centers, self.L, self.graph)
+    @property
+    def rest(self) -> NDArray[np.float64]:
+        """(n, 3) rest positions of the nodes."""
+        return self.ellipses.centers
+
+    @property
+    def scene_scale(self) -> float:
+        """Size s of the scene in world units."""
+        return self.ellipses.scene_scale
+
+    def shared(self, make: Callable[["Surface"], T]) -> T:
+        """What all handle sets of the scene have in common, made by ``make(surface)`` when first asked for."""
+        if make not in self._shared:
+            self._shared[make] = make(self)
+        return self._shared[make]
 
 
 def surface_of(
@@ -109,6 +111,7 @@ def surface_of(
     cache: StageCache | None = None,
     stages: StageProgress = silent,
     near: Surface | None = None,
+    alone: Guard = unguarded,
 ) -> Surface:
     """Build the splat graph, geodesics, Laplacian and kernel carriers of a scene.
 
@@ -128,6 +131,10 @@ def surface_of(
         ``stages(name)`` gives the progress callback of a stage.
     near : Surface, optional
         One of the same ellipses; if it differs in mends only, it is gone on from.
+    alone : callable
+        Who prepares scenes on several threads lets one at a time into the loops that run on several cores, see
+        `splap_editor.session.side_by_side.alone`: where numba has to use its portable threading layer, two at once
+        abort the process.
 
     Raises
     ------
@@ -146,18 +153,18 @@ def surface_of(
         )
     require_mendable(ellipses, options)
     plain = unmended(options)
-    key = content_key((STAGE_VERSION, ellipses.centers, ellipses.semi_axes, ellipses.rows, plain))
+    key = content_key((_made_by(plain), ellipses.centers, ellipses.semi_axes, ellipses.rows, plain))
     if near is not None and near.ellipses is ellipses and unmended(near.options) == plain:
         made = near.stages
     else:
         kept = None
         if cache is not None:
             kept = cache.load(key, lambda arrays: unpacked_stages(arrays, options, ellipses.n_nodes))
-        made = kept or plain_stages(ellipses, options, timed, stages)
+        made = kept or plain_stages(ellipses, options, timed, stages, alone)
         if cache is not None and kept is None:
             cache.store(key, packed_stages(made))
     if made.options != options:
-        made = mended_stages(ellipses, made, options, timed, stages)
+        made = mended_stages(ellipses, made, options, timed, stages, alone)
     if options != plain:
         key = content_key((key, options))
     with timed("kernels"):
@@ -165,75 +172,10 @@ def surface_of(
     return Surface(ellipses, made, binding, key, timings)
 
 
-def handles_of(surface: Surface, edit: Edit) -> Handles:
-    """Resolve an edit's regions to nodes of the scene; defaults in units of the scene scale are filled in."""
-    s = surface.ellipses.scene_scale
-    free = edit.free_radius
-    if free is not None and np.isnan(free):
-        free = 0.5 * s
-    if edit.method == "bbw":
-        free = None
-    cages = [np.inf if h.cage_radius is None else h.cage_radius for h in edit.active_handles]
-    cages = [0.3 * s if np.isnan(radius) else radius for radius in cages]
-    return handle_nodes(
-        surface.ellipses,
-        [h.region for h in edit.active_handles],
-        list(edit.pins),
-        free_radius=free,
-        cage_radii=cages,
-    )
-
-
-def deformer_of(
-    surface: Surface,
-    edit: Edit,
-    handles: Handles,
-    *,
-    cache: StageCache | None = None,
-    progress: Progress,
-    stages: StageProgress | None = None,
-    n_threads: int = 4,
-) -> Deformer:
-    """Bind the deformer that an edit names; the one place where deformers are chosen.
-
-    ``stages`` is told, instead of ``progress``, where a deformer has more to say than a share; ``n_threads`` is for
-    those that have independent parts.
-    """
-    if edit.method == "bbw":
-        # The quadratic-program solvers are imported only by those who want them.
-        from splap_editor.engine.bbw_binding import bbw_deformer
-
-        return bbw_deformer(
-            surface,
-            handles,
-            blending=edit.blending,
-            cache=cache,
-            progress=progress,
-            stages=stages,
-            n_threads=n_threads,
-        )
-    return ArapDeformer(
-        surface.ellipses.centers,
-        surface.L,
-        handles,
-        scene_scale=surface.ellipses.scene_scale,
-        M=surface.M,
-        graph=surface.graph,
-        triangles=surface.triangles,
-        options=ArapOptions(
-            kind=edit.solver.kind,
-            tolerance=edit.solver.tolerance,
-            iterations=edit.solver.iterations,
-            smoothness=edit.solver.smoothness,
-        ),
-        scene=surface.arap_scene,
-        progress=progress,
-    )
-
-
-def kernels_of(surface: Surface, edit: Edit, deformation: Deformation) -> AdaptedKernels:
-    """Adapt every splat of the file to a deformation."""
-    return adapt_kernels(surface.binding, deformation, method=edit.adaptation, hops=edit.hops)
+def _made_by(options: GraphOptions) -> str:
+    """Hash of the source of everything that the cached stages are made by."""
+    rows = GRAPH_RULES[options.rule], NEIGHBORHOODS[options.neighborhood], LAPLACIANS[options.laplacian]
+    return source_hash("splap_editor.engine.surface_stages", *(row.module for row in rows))
 
 
 class _Timed:

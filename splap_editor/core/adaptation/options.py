@@ -1,0 +1,43 @@
+"""How each splat's ellipse follows the deformed surface: options."""
+
+from dataclasses import dataclass
+
+from splap_editor.core.options import Choice, check_options, option
+
+ADAPTATIONS = {
+    "surface": Choice("Follows the surface", "The ellipse's inscribed triangle follows the surface."),
+    "affine": Choice("Stretches with it", "The least-squares affine map of rings of neighbours, the paper's baseline."),
+    "none": Choice("Moves only", "Centres move and nothing else."),
+}
+
+
+@dataclass(frozen=True)
+class AdaptationOptions:
+    """How kernels follow the surface.
+
+    Parameters
+    ----------
+    adaptation : str
+        One of `ADAPTATIONS`.
+    hops : int
+        Rings of neighbours of the affine adaptation.
+    """
+
+    adaptation: str = option(
+        "surface",
+        "How each ellipse follows the bent surface.",
+        label="Splat shape",
+        choices=ADAPTATIONS,
+        is_always_written=True,
+    )
+    hops: int = option(
+        1,
+        "Rings of neighbours that the stretch is taken from.",
+        label="Neighbours",
+        least=1,
+        most=3,
+        only_for=("adaptation", ("affine",)),
+    )
+
+    def __post_init__(self) -> None:
+        check_options(self)

@@ -1,0 +1,244 @@
+"""An edit bound to a surface, and the poses it gives: file → edit → bind → solve → adapt stands here once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels, adapt_kernels, adapted_splats
+from splap_editor.core.adaptation.options import AdaptationOptions
+from splap_editor.core.binding import Binding, made_anew
+from splap_editor.core.deformer import Deformation, Deformer, Handles
+from splap_editor.core.deformers import DEFORMERS
+from splap_editor.core.handle_nodes import handle_nodes
+from splap_editor.core.kept_arrays import Arrays
+from splap_editor.core.options import loaded, world_length
+from splap_editor.core.progress import Progress, Runner, StageProgress, in_turn, no_progress, silent
+from splap_editor.core.reach_options import ReachOptions
+from splap_editor.core.splats.splats import Splats
+from splap_editor.engine.cache import StageCache, content_key
+from splap_editor.engine.edit import Edit
+from splap_editor.engine.quantities import Snapshot
+from splap_editor.engine.recipe_edit import edit_of
+from splap_editor.engine.sources import source_hash
+from splap_editor.engine.surface import Surface, surface_of
+from splap_editor.io.ply import SplatFile
+from splap_editor.io.recipe import Recipe
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, eq=False)
+class Posed:
+    """Every splat of a scene as an edit poses it.
+
+    Parameters
+    ----------
+    rest : Splats
+        As in the file.
+    surface : Surface or None
+        None where nothing needed it.
+    bound : BoundEdit or None
+        None where no handle is enabled: then everything is at rest.
+    deformation : Deformation or None
+    kernels : AdaptedKernels or None
+    """
+
+    rest: Splats
+    surface: Surface | None = None
+    bound: BoundEdit | None = None
+    deformation: Deformation | None = None
+    kernels: AdaptedKernels | None = None
+
+    @property
+    def splats(self) -> Splats:
+        """Splats to write: those of the file, with the changed rows replaced."""
+        return self.rest if self.kernels is None else adapted_splats(self.rest, self.kernels)
+
+    @property
+    def snapshot(self) -> Snapshot:
+        """What quantities are worked out from; the weight asked for is that of the only handle."""
+        handles = weights = handle = None
+        if self.bound is not None:
+            handles, weights = self.bound.handles, self.bound.weights
+            handle = 0 if len(self.bound.edit.active_handles) == 1 else None
+        ellipses = self.surface.ellipses if self.surface is not None else None
+        return Snapshot(self.rest, ellipses, self.surface, self.kernels, handles, weights, handle)
+
+
+@dataclass(frozen=True, eq=False)
+class BoundEdit:
+    """A deformer ready to pose, and what it was made for.
+
+    Parameters
+    ----------
+    surface : Surface
+    edit : Edit
+    handles : Handles
+    deformer : Deformer
+    """
+
+    surface: Surface
+    edit: Edit
+    handles: Handles
+    deformer: Deformer
+
+    @property
+    def weights(self) -> object:
+        """(n, H) handle weights, None where the deformer has none."""
+        return self.deformer.weights if self.edit.deformer.has_weights else None
+
+    def pose(
+        self,
+        edit: Edit | None = None,
+        *,
+        progress: Progress = no_progress,
+        shown: Callable[[Posed], None] | None = None,
+    ) -> Posed:
+        """Settle the handles at the poses of an edit that binds like this one's, by default its own.
+
+        Parameters
+        ----------
+        edit : Edit, optional
+        progress : callable
+            Told how far the deformer is.
+        shown : callable, optional
+            Given intermediate results.
+        """
+        edit = edit or self.edit
+        show = None if shown is None else lambda deformation: shown(self.adapted(edit, deformation))
+        return self.adapted(edit, self.deformer.solve(edit.transforms, progress=progress, shown=show))
+
+    def drag(self, edit: Edit) -> Posed:
+        """Pose quickly for the frame of a drag, going on from the frame before."""
+        return self.adapted(edit, self.deformer.drag(edit.transforms))
+
+    def adapted(self, edit: Edit, deformation: Deformation) -> Posed:
+        """Adapt every splat of the file to a deformation."""
+        kernels = kernels_of(self.surface, edit, deformation)
+        return Posed(self.surface.binding.splats, self.surface, self, deformation, kernels)
+
+
+def bind(
+    surface: Surface,
+    edit: Edit | Recipe,
+    *,
+    cache: StageCache | None = None,
+    progress: Progress = no_progress,
+    stages: StageProgress | None = None,
+    run: Runner = in_turn,
+) -> BoundEdit:
+    """Bind the deformer that an edit names: the slow part of posing, to be done once for a set of handles.
+
+    Parameters
+    ----------
+    surface : Surface
+    edit : Edit or Recipe
+        With an enabled handle at least.
+    cache : StageCache, optional
+        Keeps what took long.
+    progress : callable
+        Told the share done; may cancel.
+    stages : callable, optional
+        Told instead, where a deformer has more to say than a share, with words for it.
+    run : callable
+        Runs independent parts, see `splap_editor.session.side_by_side`.
+
+    Raises
+    ------
+    UnconstrainedComponentError
+        The edit holds nothing.
+    ValueError
+        The surface was made with other graph options than the edit's.
+    """
+    edit = edit_of(edit, surface.binding.splats) if isinstance(edit, Recipe) else edit
+    if surface.options != edit.graph:
+        raise ValueError(
+            f"the surface was made with {surface.options}, the edit wants {edit.graph}: prepare it with these"
+        )
+    row, handles = edit.deformer, handles_of(surface, edit)
+    keep = made_anew if cache is None else _kept_in(cache, (source_hash(*row.modules), surface.key, *_arrays(handles)))
+    binding = Binding(progress, stages, run, keep)
+    return BoundEdit(surface, edit, handles, row.load()(surface, handles, edit.options[row.options], binding))
+
+
+def posed(
+    file: SplatFile,
+    edit: Edit | Recipe,
+    *,
+    cache: StageCache | None = None,
+    stages: StageProgress = silent,
+    run: Runner = in_turn,
+    with_surface: bool = False,
+) -> Posed:
+    """Pose the splats of a file by an edit, from the graph to the adapted kernels.
+
+    Parameters
+    ----------
+    file : SplatFile
+    edit : Edit or Recipe
+        Without an enabled handle everything stays at rest, and no surface is made unless it is wanted.
+    cache, run
+        As of `bind`.
+    stages : callable
+        ``stages(name)`` gives the progress callback of a stage.
+    with_surface : bool
+        Make the surface in any case.
+    """
+    edit = edit_of(edit, file.splats) if isinstance(edit, Recipe) else edit
+    if not edit.active_handles and not with_surface:
+        return Posed(file.splats)
+    surface = surface_of(file.splats, edit.graph, cache=cache, stages=stages)
+    if not edit.active_handles:
+        return Posed(file.splats, surface)
+    bound = bind(surface, edit, cache=cache, progress=stages("bind"), run=run)
+    deformation = bound.deformer.solve(edit.transforms, progress=stages("solve"))
+    stages("adapt")
+    return bound.adapted(edit, deformation)
+
+
+def ready_for_drags(surface: Surface) -> None:
+    """Make what the first drag of any deformer would wait for."""
+    for ready in dict.fromkeys(row.ready for row in DEFORMERS if row.ready):
+        loaded(ready)(surface)
+
+
+def handles_of(surface: Surface, edit: Edit) -> Handles:
+    """Resolve an edit's regions to nodes of the scene, and its lengths to world units."""
+    s, row = surface.scene_scale, edit.deformer
+    free = world_length(edit.options[ReachOptions].free_radius, s) if row.has_free_radius else None
+    cages = [world_length(handle.cage_radius, s) for handle in edit.active_handles]
+    return handle_nodes(
+        surface.ellipses,
+        [handle.region for handle in edit.active_handles],
+        list(edit.pins),
+        free_radius=free,
+        cage_radii=[np.inf if radius is None else radius for radius in cages],
+    )
+
+
+def kernels_of(surface: Surface, edit: Edit, deformation: Deformation) -> AdaptedKernels:
+    """Adapt every splat of the file to a deformation."""
+    options = edit.options[AdaptationOptions]
+    return adapt_kernels(surface.binding, deformation, method=options.adaptation, hops=options.hops)
+
+
+def _arrays(handles: Handles) -> tuple[object, ...]:
+    return handles.indices, handles.labels, handles.centers, handles.cage_radii
+
+
+def _kept_in(cache: StageCache, made_from: tuple[object, ...]):
+    """Keep results under the hash of what they are made from."""
+
+    def keep(name: object, make: Callable[[], T], packed: Callable[[T], Arrays], unpacked: Callable[[Arrays], T]) -> T:
+        key = content_key((*made_from, name))
+        kept = cache.load(key, unpacked)
+        if kept is None:
+            kept = make()
+            cache.store(key, packed(kept))
+        return kept
+
+    return keep

@@ -1,0 +1,52 @@
+"""Which source made a stage: part of the name under which its result is kept."""
+
+import hashlib
+import re
+from functools import cache
+from importlib.util import find_spec
+
+_IMPORT = re.compile(
+    r"^[ \t]*(?:from|import)[ \t]+(splap_editor[.\w]*)(?:[ \t]+import[ \t]+(?:\(([^)]*)\)|([^\n]*)))?", re.MULTILINE
+)
+
+
+def source_hash(*modules: str) -> str:
+    """Hash of the source of some modules and of all modules of this package that they import.
+
+    Whoever changes a stage changes its hash, and results of the old source are no longer found. Sources are read once
+    in a process. What the package depends on (numpy, scipy, …) does not count.
+    """
+    digest = hashlib.blake2b(digest_size=16)
+    for module in sorted(_closure(frozenset(modules))):
+        digest.update(module.encode() + b"\0" + _source(module).encode() + b"\0")
+    return digest.hexdigest()
+
+
+@cache
+def _closure(modules: frozenset[str]) -> frozenset[str]:
+    found: set[str] = set()
+    waiting = list(modules)
+    while waiting:
+        module = waiting.pop()
+        if module not in found:
+            found.add(module)
+            waiting += _imported(module)
+    return frozenset(found)
+
+
+@cache
+def _imported(module: str) -> frozenset[str]:
+    """Modules of this package that a module imports, anywhere in it."""
+    found = set()
+    for name, in_lines, in_line in _IMPORT.findall(_source(module)):
+        found.add(name)
+        if find_spec(name).submodule_search_locations is not None:
+            members = (member.split("#")[0].split(" as ")[0].strip() for member in (in_lines or in_line).split(","))
+            found.update(f"{name}.{member}" for member in members if member and find_spec(f"{name}.{member}"))
+    return frozenset(found)
+
+
+@cache
+def _source(module: str) -> str:
+    """Text of a module, from its file or from an archive that holds it."""
+    return find_spec(module).loader.get_source(module) or ""
