@@ -28,6 +28,7 @@ _KIND_OF = {
     "test_cli.py": "pure",
     "test_frames_cli.py": "offscreen",
     "test_kinds.py": "pure",
+    "test_readme.py": "pure",
     "test_packaging.py": "pure",
     "test_resources.py": "pure",
     "tools": "offscreen",

@@ -84,3 +84,12 @@ def test_mends_of_another_file_are_refused_before_any_work(splats, plain):
     with pytest.raises(ValueError, match="cut: rows 999999 are not in the file"):
         surface_of(splats, GraphOptions(cut=((0, 999_999),)), stages=lambda name: stages.append(name))
     assert stages == []
+
+
+def test_another_laplacian_of_the_same_graph_is_kept_by_itself(tmp_path):
+    splats = read_ply(resource("samples", "tube.ply")).splats
+    cache = StageCache(tmp_path)
+    stars, robust = (surface_of(splats, GraphOptions(laplacian=name), cache=cache) for name in ("stars", "robust"))
+    assert stars.key != robust.key and "laplacian" in robust.timings_s
+    np.testing.assert_array_equal(stars.graph.indices, robust.graph.indices)
+    assert abs(stars.L - robust.L).max() > 1e-3
