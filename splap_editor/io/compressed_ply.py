@@ -7,7 +7,7 @@ from splap_editor.core.splats.splats import Splats
 from splap_editor.io.layout import Layout, PlyEvidence
 from splap_editor.io.ply_header import PlyError
 from splap_editor.io.ply_table import PlyTable, field_types
-from splap_editor.io.splat_columns import SH_C0, column_group
+from splap_editor.io.splat_columns import SH_C0
 
 CHUNK = 256
 """Splats that share one chunk's bounds."""
@@ -41,17 +41,22 @@ def packed_splats(evidence: PlyEvidence, layout: Layout) -> tuple[Splats, list[s
         If the elements do not belong together.
     """
     table = evidence.table
-    chunks = table.element("chunk")
     n = table.n_rows
+    if any(element.has_lists for element in table.header.elements):
+        raise PlyError(f"{table.name} is damaged: compressed splats have no lists. Export it again.")
+    if table.header.is_ascii:
+        raise PlyError(f"{table.name} is damaged: compressed splats are never text. Export it again.")
+    chunks = table.element("chunk")
     if chunks is None or len(chunks) * CHUNK < n:
         held = 0 if chunks is None else len(chunks)
         raise PlyError(
             f"{table.name} is damaged: {n:,} compressed splats need {-(-n // CHUNK):,} chunks, {held:,} are there. "
             "Export it again."
         )
-    if any(element.has_lists for element in table.header.elements):
-        raise PlyError(f"{table.name} is damaged: compressed splats have no lists. Export it again.")
-    bounds = {column: np.repeat(chunks[column].astype(np.float32), CHUNK)[:n] for column in field_types(chunks.dtype)}
+    for column in layout.packed:
+        if table.columns[column].dtype.kind not in "iu" or table.columns[column].dtype.itemsize != 4:
+            raise PlyError(f"{table.name} is damaged: {column} is not of type uint. Export it again.")
+    bounds = {column: chunks[column].astype(np.float32) for column in field_types(chunks.dtype)}
     packed = table.columns["packed_color"].astype(np.uint32)
     colour = np.stack([(packed >> shift & 255).astype(np.float32) / 255 for shift in (24, 16, 8, 0)], axis=1)
     rgb: NDArray[np.floating] = colour[:, :3]
@@ -92,11 +97,13 @@ def _unit_11_10_11(packed: NDArray) -> NDArray[np.float32]:
 
 
 def _lerped(share: NDArray[np.floating], bounds: dict[str, NDArray], *names: str) -> NDArray[np.float32]:
-    """Columns between their chunk's bounds; either end is met exactly."""
+    """Columns between the bounds of their chunks; either end is met exactly."""
     out = np.empty((len(share), len(names)), np.float32)
     for c, name in enumerate(names):
-        low, high = bounds[name.format("min")], bounds[name.format("max")]
-        out[:, c] = low * (1 - share[:, c]) + high * share[:, c]
+        low, high = (np.repeat(bounds[name.format(end)], CHUNK)[: len(share)] for end in ("min", "max"))
+        # Bounds that are no numbers give positions that are none, which are refused by row.
+        with np.errstate(invalid="ignore", over="ignore"):
+            out[:, c] = low * (1 - share[:, c]) + high * share[:, c]
     return out
 
 
@@ -123,6 +130,12 @@ def _harmonics(table: PlyTable) -> NDArray[np.float32]:
     names = tuple(f"f_rest_{i}" for i in range(len(held)))
     if len(rows) != n or len(names) not in (9, 24, 45, 72) or set(names) != held.keys():
         raise PlyError(f"{table.name} is damaged: its 'sh' element does not fit its splats. Export it again.")
-    byte = column_group({name: rows[name] for name in names}, names)
-    share = np.where(byte == 0, 0, np.where(byte == 255, 1, (byte + 0.5) / 256))
-    return ((share - 0.5) * 8).astype(np.float32).reshape(n, 3, -1).transpose(0, 2, 1)
+    if any(dtype != np.uint8 for dtype in held.values()):
+        raise PlyError(f"{table.name} is damaged: its 'sh' element is not of type uchar. Export it again.")
+    share = (np.arange(256, dtype=np.float32) + 0.5) / 256
+    share[[0, 255]] = 0, 1
+    # A byte at a time through a table, which takes no more memory than the result.
+    coefficients = np.empty((n, len(names)), np.float32)
+    for c, name in enumerate(names):
+        coefficients[:, c] = ((share - 0.5) * 8)[rows[name]]
+    return coefficients.reshape(n, 3, -1).transpose(0, 2, 1)

@@ -3,6 +3,7 @@
 A new one is one more row: what its columns mean, and what gives it away.
 """
 
+import re
 from collections.abc import Callable, Collection
 from dataclasses import replace
 from difflib import get_close_matches
@@ -239,6 +240,12 @@ def require_splats(header: PlyHeader, name: str) -> None:
     numbers = [p.name for p in vertex.properties if p.length_type is None]
     nearest = min(LAYOUTS.values(), key=lambda layout: _distance_from(layout, numbers))
     missing = nearest.missing(numbers)
+    lists = [p.name for p in vertex.properties if p.length_type is not None and _is_read(p.name)]
+    if lists:
+        raise PlyError(
+            f"{name} has lists in the columns {', '.join(lists[:10])}, where one number per splat belongs. "
+            "Export it again with float properties."
+        )
     if missing:
         raise PlyError(f"{name} lacks the columns {', '.join(missing)}. Export it again with all splat columns.")
     if vertex.count == 0:
@@ -251,6 +258,21 @@ def _distance_from(layout: Layout, names: Collection[str]) -> tuple[bool, int, i
     """How far columns are from a layout: one that they fit is near, then the one that they share most with."""
     needed, missing = layout.needed(names), layout.missing(names)
     return bool(missing), len(missing) - len(needed), len(missing)
+
+
+def _is_read(column: str) -> bool:
+    """Whether any layout reads a column of that name."""
+    for layout in LAYOUTS.values():
+        names = layout.columns
+        if column in layout.packed:
+            return True
+        if names is not None and (
+            column in (*names.means, *names.log_scales, *names.quats, *names.sh0, *names.rgb, *names.normals)
+            or column in (names.opacity, names.filter_radius)
+            or re.fullmatch(re.escape(names.sh_rest) + r"\d+", column)
+        ):
+            return True
+    return False
 
 
 def _is_of_splats(column: str) -> bool:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from splap_editor.core.pose import LARGEST_COORDINATE
 from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.splats.splats import Splats
 from splap_editor.io.atomic_file import atomic_file
@@ -81,7 +82,7 @@ def read_ply(path: str | os.PathLike[str], *, layout: str | None = None, progres
     if found.bound:
         warnings.append(_BOUND.format(found.name))
     if found.activated_opacity or not glance.shows_only_usable_rows(table.n_rows):
-        _require_finite_positions(splats.means, path.name)
+        _require_usable_positions(splats.means, path.name)
         warnings += [f"{finding.sentence}; left as they are." for finding in unusable_rows(splats)]
     progress(1.0)
     return SplatFile(path, splats, table, found, warnings)
@@ -100,7 +101,8 @@ class _Glance:
             numbers = rows.view(np.float32)
             # A NaN or an infinity stays in the sum of squares, and that is the fastest pass there is. A sum that
             # overflows costs a second pass, no more.
-            clean = np.isfinite(np.dot(numbers, numbers)) and (rows["rot_0"] != 0).all()
+            with np.errstate(over="ignore", invalid="ignore"):
+                clean = np.isfinite(np.dot(numbers, numbers)) and (rows["rot_0"] != 0).all()
             self._n_clean += len(rows) if clean else 0
 
     def shows_only_usable_rows(self, n_rows: int) -> bool:
@@ -113,16 +115,20 @@ _BOUND = (
 )
 
 
-def _require_finite_positions(means: NDArray[np.floating], name: str) -> None:
-    """Refuse positions that are infinite or no numbers."""
-    finite = np.isfinite(means)
-    if not finite.all():
-        bad = np.flatnonzero(~finite.all(axis=1))
-        splats = f"{len(bad):,} splats" if len(bad) > 1 else "1 splat"
-        raise PlyError(
-            f"{name} has {splats} whose position is not finite, the first in row {bad[0]:,}. "
-            "Remove them in a splat viewer or export the file again."
-        )
+def _require_usable_positions(means: NDArray[np.floating], name: str) -> None:
+    """Refuse positions that are infinite, no numbers, or so far away that arithmetic would make them so."""
+    usable = np.abs(means) <= LARGEST_COORDINATE
+    if usable.all():
+        return
+    bad = np.flatnonzero(~usable.all(axis=1))
+    splats = f"{len(bad):,} splats" if len(bad) > 1 else "1 splat"
+    what = "is not finite"
+    if np.isfinite(means[bad]).all():
+        what = f"is farther than {LARGEST_COORDINATE:g} from the origin"
+    raise PlyError(
+        f"{name} has {splats} whose position {what}, the first in row {bad[0]:,}. "
+        "Remove them in a splat viewer or export the file again."
+    )
 
 
 def write_ply(
@@ -170,6 +176,7 @@ def write_ply(
     table, rest = file.table, file.splats
     names = file.layout.columns
     if names is None and (as_3dgs or extra or any_stored_difference(rest, splats)):
+        _require_no_overflow(splats, rest, table.name)
         table, names, rest = plain_table(table.name, splats), COMMON_NAMES, splats
     added: list[NewColumn] = []
     if names is None:
@@ -204,6 +211,20 @@ def _write_blocks(
             f"{path} cannot be written: {error.strerror or error}. Free some space or choose another place; "
             "what was there is unchanged."
         ) from error
+
+
+def _require_no_overflow(splats: Splats, rest: Splats, name: str) -> None:
+    """Refuse splats with a number that single precision does not hold where the file's own is finite."""
+    for part in ("means", "log_scales", "quats"):
+        with np.errstate(over="ignore"):
+            cells = np.asarray(getattr(splats, part)).astype(np.float32)
+        lost = ~np.isfinite(cells) & np.isfinite(getattr(rest, part))
+        if lost.any():
+            row = int(np.argmax(lost.any(axis=1)))
+            raise PlyError(
+                f"{name} cannot hold the result: {part} of row {row:,} would not be finite. Move the handles less far; "
+                "nothing was written."
+            )
 
 
 def _require_same_shape(splats: Splats, rest: Splats) -> None:

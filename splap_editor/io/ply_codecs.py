@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.progress import Progress
 from splap_editor.io.ply_header import PlyHeader
 from splap_editor.io.ply_lists import list_table
 from splap_editor.io.ply_table import PlyTable, binary_table
@@ -22,8 +23,8 @@ class PlyCodec:
         What people call it.
     suits : callable (header) → bool
         Whether a file with this header holds its rows so; the first codec that suits is taken.
-    table : callable (name, header, body) → PlyTable
-        Parses the bytes after the header. The table's ``blocks`` write them back.
+    table : callable (name, header, body, progress) → PlyTable
+        Parses the bytes after the header, told the share done. The table's ``blocks`` write them back.
     has_row_views : bool
         Whether rows can be looked at in the bytes themselves, before the file is complete.
     parsed_bytes : callable (header) → int
@@ -32,7 +33,7 @@ class PlyCodec:
 
     name: str
     suits: Callable[[PlyHeader], bool]
-    table: Callable[[str, PlyHeader, NDArray[np.uint8]], PlyTable]
+    table: Callable[[str, PlyHeader, NDArray[np.uint8], Progress], PlyTable]
     has_row_views: bool = False
     parsed_bytes: Callable[[PlyHeader], int] = lambda header: 0
 

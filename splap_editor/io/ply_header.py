@@ -5,8 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-LONGEST_HEADER = 1 << 20
-"""Bytes after which a missing ``end_header`` means that this is no PLY file."""
+LONGEST_HEADER = 1 << 16
+"""Bytes within which a header must end."""
+
+MOST_ELEMENTS = 64
+MOST_PROPERTIES = 4096
+"""Of all elements together."""
 
 _SCALAR_TYPES = {
     **{name: "i1" for name in ("char", "int8")},
@@ -18,6 +22,7 @@ _SCALAR_TYPES = {
     **{name: "f4" for name in ("float", "float32")},
     **{name: "f8" for name in ("double", "float64")},
 }
+_LENGTH_TYPES = ("i1", "u1", "i2", "u2", "i4", "u4")
 _BYTE_ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
 
 
@@ -125,7 +130,7 @@ class PlyHeader:
         out = []
         for line in lines:
             out.append(line)
-            words = line.split()
+            words = _words(line)
             if words[:1] == [b"element"]:
                 inside = words[1] == b"vertex"
             elif inside and words[:1] == [b"property"]:
@@ -158,42 +163,75 @@ def ply_header(start: bytes, name: str) -> PlyHeader:
     line_end = rb"\r" if newline == b"\r" else rb"\r?\n"
     end = re.search(rb"(?:\n|\r)end_header[ \t]*(?:" + line_end + rb")", start)
     if end is None:
-        raise PlyError(f"{name} has no 'end_header' line: the file is cut short or damaged. Copy or export it again.")
+        cut = "the file is cut short or damaged" if len(start) < LONGEST_HEADER else "no longer header is read"
+        raise PlyError(f"{name} has no 'end_header' line within {LONGEST_HEADER:,} bytes: {cut}. Export it again.")
     raw = start[: end.end()]
     format_ = None
     comments: list[str] = []
     elements: list[tuple[str, int, list[PlyProperty]]] = []
-    for line in (row.decode("utf-8", "replace").strip() for row in raw.splitlines()[1:-1]):
-        keyword, *words = line.split() or [""]
+    for line in raw.splitlines()[1:-1]:
+        keyword, *words = (word.decode("ascii", "replace") for word in _words(line) or [b""])
         if keyword in ("comment", "obj_info"):
-            comments.append(line[len(keyword) :].strip())
-        elif keyword == "format" and words and words[0] in _BYTE_ORDERS:
+            comments.append(line.decode("utf-8", "replace").strip()[len(keyword) :].strip())
+            continue
+        # Other bytes are blanks to some readers and parts of a name to others.
+        if line.translate(None, _PLAIN):
+            raise PlyError(f"{name} has a header line that is not plain ASCII: {_shown(line)}. Export the file again.")
+        if keyword == "format" and words and words[0] in _BYTE_ORDERS:
             format_ = words[0]
         elif keyword == "element" and len(words) == 2 and words[1].isdecimal() and len(words[1]) < 16:
             elements.append((words[0], int(words[1]), []))
         elif keyword == "property" and elements:
             elements[-1][2].append(_property(words, line, name))
         elif keyword:
-            raise PlyError(f"{name} has a header line that means nothing: {line!r}. Export the file again.")
+            raise PlyError(f"{name} has a header line that means nothing: {_shown(line)}. Export the file again.")
     if format_ is None:
         raise PlyError(f"{name} does not say its format (ascii or binary). Export the file again.")
     parsed = tuple(PlyElement(n, count, tuple(properties)) for n, count, properties in elements)
-    _require_distinct_names(parsed, name)
+    _require_sound_elements(parsed, name)
     return PlyHeader(raw, format_, parsed, tuple(comments), newline)
 
 
-def _property(words: list[str], line: str, name: str) -> PlyProperty:
+_PLAIN = bytes([9, *range(32, 127)])
+
+
+def _words(line: bytes) -> list[bytes]:
+    """Words of a header line: what spaces and tabs part, and line ends."""
+    return re.findall(rb"[^ \t\r\n]+", line)
+
+
+def _shown(line: bytes) -> str:
+    """A header line for a message, cut to a glance."""
+    text = repr(line.decode("utf-8", "replace").strip())
+    return text if len(text) <= 80 else text[:77] + "..."
+
+
+def _property(words: list[str], line: bytes, name: str) -> PlyProperty:
     """Parse the words after ``property``."""
     if len(words) == 2 and words[0] in _SCALAR_TYPES:
         return PlyProperty(words[1], _SCALAR_TYPES[words[0]])
-    if len(words) == 4 and words[0] == "list" and words[1] in _SCALAR_TYPES and words[2] in _SCALAR_TYPES:
-        return PlyProperty(words[3], _SCALAR_TYPES[words[2]], _SCALAR_TYPES[words[1]])
-    raise PlyError(f"{name} has a property of unknown type: {line!r}. Export it with float properties.")
+    if len(words) == 4 and words[0] == "list" and words[2] in _SCALAR_TYPES:
+        length_type = _SCALAR_TYPES.get(words[1], "")
+        if length_type in _LENGTH_TYPES:
+            return PlyProperty(words[3], _SCALAR_TYPES[words[2]], length_type)
+    raise PlyError(f"{name} has a property of unknown type: {_shown(line)}. Export it with float properties.")
 
 
-def _require_distinct_names(elements: tuple[PlyElement, ...], name: str) -> None:
-    """Refuse two elements, or two columns of one element, of the same name."""
+def _require_sound_elements(elements: tuple[PlyElement, ...], name: str) -> None:
+    """Refuse too many elements or columns, two of the same name, and rows without a column."""
+    n_properties = sum(len(element.properties) for element in elements)
+    for what, count, most in (("elements", len(elements), MOST_ELEMENTS), ("columns", n_properties, MOST_PROPERTIES)):
+        if count > most:
+            raise PlyError(f"{name} has {count:,} {what}; {most:,} are the most that are read. Export it with fewer.")
     for what, names in [("elements", [e.name for e in elements])] + [("columns", list(e.names)) for e in elements]:
-        twice = sorted({n for n in names if names.count(n) > 1})
-        if twice:
-            raise PlyError(f"{name} has two {what} named {twice[0]!r}. Export the file again.")
+        seen: set[str] = set()
+        for each in names:
+            if each in seen:
+                raise PlyError(f"{name} has two {what} named {each!r}. Export the file again.")
+            seen.add(each)
+    for element in elements:
+        if element.count and not element.properties:
+            raise PlyError(
+                f"{name} promises {element.count:,} rows of an element {element.name!r} without a column. "
+                "Export the file again."
+            )

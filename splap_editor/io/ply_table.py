@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.io.ply_header import PlyHeader
+from splap_editor.core.progress import Progress, no_progress
+from splap_editor.io.ply_header import PlyError, PlyHeader
 
 CellChanges = dict[str, tuple[NDArray[np.intp], NDArray]]
 """Column name → rows (counted from the first row of the block) and the values to put there."""
@@ -105,7 +106,7 @@ class PlyTable:
             if changed:
                 block = block.copy()
                 for name, (where, values) in changed.items():
-                    block[name][where] = cast_values(values, block.dtype[name])
+                    block[name][where] = replaced_cells(self.name, name, block[name][where], values, lo + where)
             yield self._widened(block, lo, hi, new_columns)
         yield self.body[start + rows.nbytes :]
 
@@ -124,7 +125,7 @@ class PlyTable:
         return np.concatenate(pieces, axis=1) if new_columns else old
 
 
-def binary_table(name: str, header: PlyHeader, body: NDArray[np.uint8]) -> PlyTable:
+def binary_table(name: str, header: PlyHeader, body: NDArray[np.uint8], progress: Progress = no_progress) -> PlyTable:
     """Name the columns of binary rows of equal size; nothing is copied."""
     table = PlyTable(name, header, body)
     rows = table.rows
@@ -144,3 +145,37 @@ def cast_values(values: NDArray, dtype: np.dtype) -> NDArray:
         values = np.clip(np.rint(np.nan_to_num(values)), limits.min, limits.max)
     with np.errstate(over="ignore"):
         return np.asarray(values).astype(dtype)
+
+
+def replaced_cells(name: str, column: str, before: NDArray, values: NDArray, rows: NDArray[np.intp]) -> NDArray:
+    """Values in a column's own type, on their way into the file.
+
+    Parameters
+    ----------
+    name, column : str
+        File and column, for the message.
+    before : (n,) array
+        What the cells hold, in the column's type.
+    values : (n,) float
+        What to put there.
+    rows : (n,) int
+        File rows of the cells.
+
+    Raises
+    ------
+    PlyError
+        If a number that the file holds would become one that its column cannot hold.
+    """
+    cells = cast_values(values, before.dtype)
+    if before.dtype.kind in "iu":
+        # Half a step beyond the limits still rounds to them.
+        lost = ~(np.abs(values - cells) <= 0.5 + 1e-6 * np.abs(values))
+    else:
+        lost = ~np.isfinite(cells) & np.isfinite(before)
+    if lost.any():
+        at = int(np.argmax(lost))
+        raise PlyError(
+            f"{name} cannot hold the result: {column} of row {rows[at]:,} would be {values[at]:g}, which its column of "
+            f"type {before.dtype.name} has no number for. Move the handles less far; nothing was written."
+        )
+    return cells

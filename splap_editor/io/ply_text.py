@@ -9,10 +9,14 @@ from io import BytesIO
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.io.ply_header import PlyElement, PlyError, PlyHeader
-from splap_editor.io.ply_table import CellChanges, NewColumn, PlyTable, cast_values
+from splap_editor.io.ply_table import CellChanges, NewColumn, PlyTable, cast_values, field_types, replaced_cells
 
 _BLOCK_ROWS = 1 << 13
+_BLOCK_BYTES = 1 << 20
+"""Text that is looked through, or parsed, at a time."""
+
 _NUMBER_BYTES = b"0123456789+-.eEinfatyINFATY \t\r\n"
 
 
@@ -24,18 +28,16 @@ class TextTable(PlyTable):
     ----------
     line_starts : (N + 1,) int
         Where in ``body`` the line of each row begins, and where the last one ends.
+    numbers : (N,) structured array
+        The vertex columns that are no lists; ``columns`` are views into it.
     """
 
     line_starts: NDArray[np.intp] = field(default_factory=lambda: np.zeros(1, np.intp))
+    numbers: NDArray = field(default_factory=lambda: np.zeros(0))
 
     def element(self, name: str) -> NDArray | None:
         """Return the vertex element as a structured array; text holds no views of the others."""
-        if name != "vertex":
-            return None
-        rows = np.empty(self.n_rows, [(column, values.dtype) for column, values in self.columns.items()])
-        for column, values in self.columns.items():
-            rows[column] = values
-        return rows
+        return self.numbers if name == "vertex" else None
 
     def blocks(
         self, changes: Callable[[int, int], CellChanges], new_columns: list[NewColumn]
@@ -57,7 +59,8 @@ class TextTable(PlyTable):
         vertex = self.header.vertex
         replaced: dict[int, list[tuple[str, bytes]]] = {}
         for name, (rows, values) in changed.items():
-            words = _words(cast_values(values, self.columns[name].dtype))
+            before = self.columns[name][lo:hi][rows]
+            words = _words(replaced_cells(self.name, name, before, values, lo + rows))
             for row, word in zip(rows.tolist(), words, strict=True):
                 replaced.setdefault(row, []).append((name, word))
         added = [(c.after, _words(c.values[lo:hi])) for c in new_columns]
@@ -88,7 +91,10 @@ def _last_words(vertex: PlyElement, words: list[bytes]) -> dict[str, int]:
     place, next_word = {}, 0
     for p in vertex.properties:
         if p.length_type is not None:
-            next_word += int(words[next_word])
+            length = int(words[next_word])
+            if not 0 <= length <= len(words):
+                raise ValueError(f"a list of {length} is not in {len(words)} words")
+            next_word += length
         place[p.name] = next_word
         next_word += 1
     if next_word != len(words):
@@ -101,7 +107,7 @@ def _words(values: NDArray) -> list[bytes]:
     return [str(value).encode() for value in values]
 
 
-def text_table(name: str, header: PlyHeader, body: NDArray[np.uint8]) -> PlyTable:
+def text_table(name: str, header: PlyHeader, body: NDArray[np.uint8], progress: Progress = no_progress) -> PlyTable:
     """Parse the vertex element of an ascii file.
 
     Raises
@@ -109,27 +115,63 @@ def text_table(name: str, header: PlyHeader, body: NDArray[np.uint8]) -> PlyTabl
     PlyError
         If lines are missing or hold something else than the promised numbers.
     """
-    ends = np.flatnonzero(body == (13 if header.newline == b"\r" else 10)) + 1
-    if len(body) and (len(ends) == 0 or ends[-1] != len(body)):
-        ends = np.append(ends, len(body))
-    n_lines = sum(element.count for element in header.elements)
-    if len(ends) < n_lines:
-        raise PlyError(
-            f"{name} is cut short: its header promises {n_lines:,} rows, {len(ends):,} are there. "
-            "Copy or export it again."
-        )
-    bounds = np.concatenate([[0], ends])
-    _require_whole_last_line(name, header, body[bounds[n_lines - 1] : bounds[n_lines]].tobytes())
     first = 0
     for element in header.elements:
         if element.name == "vertex":
             break
         first += element.count
+    starts, last = _line_starts(name, header, body, first, part_of(progress, 0.0, 0.2))
+    _require_whole_last_line(name, header, last)
     vertex = header.vertex
-    starts = bounds[first : first + vertex.count + 1]
-    parsed = _parsed_list_columns if vertex.has_lists else _parsed_columns
-    columns = parsed(name, vertex, body, starts)
-    return TextTable(name, header, body, columns, starts)
+    numbers = np.empty(vertex.count, [(p.name, p.type) for p in vertex.properties if p.length_type is None])
+    columns = {column: numbers[column] for column in field_types(numbers.dtype)}
+    parse = _parse_list_columns if vertex.has_lists else _parse_columns
+    parse(name, vertex, body, starts, columns, part_of(progress, 0.2, 1.0))
+    return TextTable(name, header, body, columns, starts, numbers)
+
+
+def _line_starts(
+    name: str, header: PlyHeader, body: NDArray[np.uint8], first: int, progress: Progress
+) -> tuple[NDArray[np.intp], bytes]:
+    """Where the lines of the vertices begin and the last one ends, and the last line that the header promises.
+
+    Only the vertices' lines are kept note of, so that neither long faces nor a tail of blank lines takes memory.
+    """
+    n_vertices = header.vertex.count
+    n_lines = sum(element.count for element in header.elements)
+    starts = np.empty(n_vertices + 1, np.intp)
+    # Line i begins where line i - 1 ends; line 0 at the start.
+    starts[0] = last_start = last_end = 0
+    n_ends = 0
+    for lo in range(0, len(body), _BLOCK_BYTES):
+        progress(lo / len(body))
+        ends = lo + np.flatnonzero(body[lo : lo + _BLOCK_BYTES] == (13 if header.newline == b"\r" else 10)) + 1
+        if lo + _BLOCK_BYTES >= len(body) and (ends[-1] if len(ends) else last_end) != len(body):
+            ends = np.append(ends, len(body))
+        ends = ends[: n_lines - n_ends]
+        if not len(ends):
+            continue
+        # End number n_ends + k is the start of that line + 1; those of vertices begin at line `first`.
+        a, b = max(first - 1 - n_ends, 0), max(min(first + n_vertices - n_ends, len(ends)), 0)
+        if a < b:
+            at = n_ends + a + 1 - first
+            starts[at : at + b - a] = ends[a:b]
+        last_start, last_end = (int(ends[-2]) if len(ends) > 1 else last_end), int(ends[-1])
+        n_ends += len(ends)
+        if n_ends == n_lines:
+            break
+    if n_ends < n_lines:
+        if header.newline != b"\r" and np.count_nonzero(body == 13) >= n_lines:
+            raise PlyError(
+                f"{name} ends its rows with CR alone and its header otherwise, which no program reads. Save it with "
+                "one kind of line end."
+            )
+        raise PlyError(
+            f"{name} is cut short: its header promises {n_lines:,} rows, {n_ends:,} are there. Copy or export it again."
+        )
+    if last_end - last_start > _BLOCK_BYTES:
+        raise _damage(name, n_lines - 1, f"within {_BLOCK_BYTES:,} bytes")
+    return starts, body[last_start:last_end].tobytes()
 
 
 def _require_whole_last_line(name: str, header: PlyHeader, line: bytes) -> None:
@@ -141,13 +183,22 @@ def _require_whole_last_line(name: str, header: PlyHeader, line: bytes) -> None:
         raise _damage(name, last.count - 1, f"whole (element {last.name!r})") from None
 
 
-def _parsed_columns(
-    name: str, vertex: PlyElement, body: NDArray[np.uint8], starts: NDArray[np.intp]
-) -> dict[str, NDArray]:
+def _parse_columns(
+    name: str,
+    vertex: PlyElement,
+    body: NDArray[np.uint8],
+    starts: NDArray[np.intp],
+    columns: dict[str, NDArray],
+    progress: Progress,
+) -> None:
     """Parse the numbers of the vertex lines, in blocks so that memory stays bounded."""
-    columns = {p.name: np.empty(vertex.count, p.type) for p in vertex.properties}
-    for lo in range(0, vertex.count, _BLOCK_ROWS):
-        hi = min(lo + _BLOCK_ROWS, vertex.count)
+    lo = 0
+    while lo < vertex.count:
+        progress(lo / vertex.count)
+        hi = int(np.searchsorted(starts, starts[lo] + _BLOCK_BYTES, side="right")) - 1
+        hi = min(max(hi, lo + 1), lo + _BLOCK_ROWS, vertex.count)
+        if starts[hi] - starts[lo] > _BLOCK_BYTES:
+            raise _damage(name, lo, f"within {_BLOCK_BYTES:,} bytes")
         text = body[starts[lo] : starts[hi]].tobytes()
         numbers = None
         # Bytes that only some parsers take for blanks would split a line differently when it is written.
@@ -158,15 +209,23 @@ def _parsed_columns(
             raise _damage(name, _first_bad_line(text, lo, len(columns)), f"{len(columns)} numbers")
         for column, values in zip(columns.values(), numbers.T, strict=True):
             column[lo:hi] = cast_values(values, column.dtype)
-    return columns
+        lo = hi
 
 
-def _parsed_list_columns(
-    name: str, vertex: PlyElement, body: NDArray[np.uint8], starts: NDArray[np.intp]
-) -> dict[str, NDArray]:
+def _parse_list_columns(
+    name: str,
+    vertex: PlyElement,
+    body: NDArray[np.uint8],
+    starts: NDArray[np.intp],
+    columns: dict[str, NDArray],
+    progress: Progress,
+) -> None:
     """Parse the scalar numbers of vertex lines that also hold lists, line by line."""
-    columns = {p.name: np.empty(vertex.count, p.type) for p in vertex.properties if p.length_type is None}
     for row in range(vertex.count):
+        if row % 256 == 0:
+            progress(row / vertex.count)
+        if starts[row + 1] - starts[row] > _BLOCK_BYTES:
+            raise _damage(name, row, f"within {_BLOCK_BYTES:,} bytes")
         words = body[starts[row] : starts[row + 1]].tobytes().split()
         try:
             place = _last_words(vertex, words)
@@ -174,7 +233,6 @@ def _parsed_list_columns(
                 values[row] = cast_values(np.array(float(words[place[column]])), values.dtype)
         except (ValueError, IndexError):
             raise _damage(name, row, "the promised numbers and lists") from None
-    return columns
 
 
 def _damage(name: str, row: int, wanted: str) -> PlyError:

@@ -2,14 +2,14 @@
 
 import os
 import stat
+from io import FileIO
 from pathlib import Path
-from typing import BinaryIO
 
 MOST_TEXT_BYTES = 64 << 20
 """Largest recipe or session that is read."""
 
 
-def open_regular(path: str | os.PathLike[str], most_bytes: int | None = None) -> BinaryIO:
+def open_regular(path: str | os.PathLike[str], most_bytes: int | None = None) -> FileIO:
     """Open a file for reading, unbuffered; what is no regular file is refused before a byte is asked of it.
 
     A FIFO or a device would keep the reader waiting for ever, or never end.
@@ -37,7 +37,7 @@ def open_regular(path: str | os.PathLike[str], most_bytes: int | None = None) ->
         _require_regular(held, path)
         if most_bytes is not None and held.st_size > most_bytes:
             raise OSError(0, f"it has {held.st_size:,} bytes and at most {most_bytes:,} are read", str(path))
-        return os.fdopen(handle, "rb", buffering=0)
+        return FileIO(handle, "rb")
     except BaseException:
         os.close(handle)
         raise
@@ -72,4 +72,4 @@ def _require_regular(held: os.stat_result, path: str | os.PathLike[str]) -> None
         stat.S_IFBLK: "a device",
     }
     kind = kinds.get(stat.S_IFMT(held.st_mode), "something else")
-    raise OSError(0, f"it is {kind}, not a file", str(Path(path)))
+    raise OSError(0, f"it is {kind}, not a regular file", str(Path(path)))

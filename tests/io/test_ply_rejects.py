@@ -2,6 +2,7 @@
 
 import os
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from splap_editor.io import ply_reader
 from splap_editor.io.ply import PlyError, read_ply, write_ply
 from tests.reference.ply import compressed_bytes, ply_bytes, splat_columns
 
+LETTERS = range(33, 123)
 FORMATS = ["binary_little_endian", "binary_big_endian", "ascii"]
 
 
@@ -45,7 +47,19 @@ def test_what_is_no_ply_is_refused(data, tmp_path):
         (b"property list float", "unknown type"),
         (b"property float x", "two columns named 'x'"),
         (b"element vertex 2", "two elements named 'vertex'"),
-        (b"\xff\xfe", "means nothing"),
+        (b"\xff\xfe", "not plain ASCII"),
+        (b"property float a\xc2\xa0b", "not plain ASCII"),
+        (b"property\x0bfloat a", "not plain ASCII"),
+        (b"property float \x00", "not plain ASCII"),
+        (b"property list float int a", "unknown type"),
+        (b"element empty 5", "5 rows of an element 'empty' without a column"),
+        (b"element empty 4000000000", "4,000,000,000 rows of an element 'empty' without a column"),
+        (
+            b"\n".join(b"element a%d 0\n" % i + b"\n".join(b"property int %c" % c for c in LETTERS) for i in range(46)),
+            "4,163 columns; 4,096 are the most",
+        ),
+        (b"\n".join(b"element a%d 0" % i for i in range(64)), "65 elements; 64 are the most"),
+        (b"comment " + b"x" * 70000, "no 'end_header' line within 65,536 bytes"),
     ],
 )
 def test_a_broken_header_line_is_refused_with_the_line(line, message, tmp_path):
@@ -130,7 +144,80 @@ def test_missing_columns_are_named(tmp_path):
     refused(tmp_path, ply_bytes(columns(f_dc_1=None)), "lacks the columns f_dc_1")
     refused(tmp_path, ply_bytes(columns(scale_1=None)), "lacks the columns scale_1")
     opacity = [np.zeros(1, "f4")] * 6
-    refused(tmp_path, ply_bytes(columns(opacity=opacity)), "lacks the columns opacity")
+    refused(tmp_path, ply_bytes(columns(opacity=opacity)), "has lists in the columns opacity")
+
+
+@pytest.mark.parametrize("name", ["x", "f_dc_0", "f_rest_3", "opacity", "scale_1", "rot_0", "rot_3", "nx", "filter_3D"])
+@pytest.mark.parametrize("format_", FORMATS)
+def test_a_list_where_a_number_belongs_is_named(name, format_, tmp_path):
+    held = columns(**{name: [np.zeros(1, "f4")] * 6})
+    refused(tmp_path, ply_bytes(held, format_), f"has lists in the columns {name}, where one number")
+
+
+@pytest.mark.parametrize("name", ["packed_position", "packed_color"])
+def test_packed_columns_of_another_type_are_named(name, tmp_path):
+    data = compressed_bytes(splat_columns(300, np.random.default_rng(0), n_rest=9))
+    refused(tmp_path, data.replace(b"uint " + name.encode(), b"float " + name.encode()), f"{name} is not of type uint")
+    refused(tmp_path, data.replace(b"uchar f_rest_", b"char f_rest_"), "'sh' element is not of type uchar")
+
+
+@pytest.mark.parametrize("format_", FORMATS)
+@pytest.mark.parametrize("value", [2e30, -1e38])
+def test_positions_beyond_the_limit_are_counted(format_, value, tmp_path):
+    x = np.zeros(6, "f4")
+    x[3] = value
+    message = r"1 splat whose position is farther than 1e\+30 from the origin, the first in row 3"
+    refused(tmp_path, ply_bytes(columns(x=x), format_), message)
+    refused(tmp_path, ply_bytes(columns(x=x.astype("f8") * 1e200), format_), message)
+
+
+def test_a_list_of_negative_length_is_said(tmp_path):
+    faces = {"face": {"vertex_indices": [np.arange(3, dtype="i4")] * 4}}
+    data = ply_bytes(columns(), after=faces).replace(b"list uchar", b"list char")
+    at = len(data) - 2 * 13
+    refused(tmp_path, data[:at] + b"\xff" + data[at + 1 :], "row 2 of its element 'face' has a list of negative length")
+    text = ply_bytes(columns(), "ascii", after=faces)
+    refused(tmp_path, text[: text.rindex(b"3 0 1 2")] + b"-1 0 1 2\n", "the line of row 3 is not whole")
+
+
+def test_rows_that_end_otherwise_than_the_header_are_said(tmp_path):
+    header, body = ply_bytes(columns(), "ascii").split(b"end_header\n", 1)
+    data = header + b"end_header\n" + body.replace(b"\n", b"\r")
+    refused(tmp_path, data, "ends its rows with CR alone and its header otherwise")
+
+
+def test_a_line_without_end_is_not_parsed(tmp_path):
+    lines = ply_bytes(columns(), "ascii").split(b"\n")
+    first = lines.index(b"end_header") + 1
+    for row in (0, 5):
+        long = [*lines[: first + row], lines[first + row] + b" " * (1 << 21), *lines[first + row + 1 :]]
+        refused(tmp_path, b"\n".join(long), f"the line of row {row} is not within 1,048,576 bytes")
+
+
+@pytest.mark.parametrize("value", [1e39, -1e300])
+@pytest.mark.parametrize("format_", FORMATS)
+@pytest.mark.parametrize("where", ["alone", "beside lists"])
+def test_a_result_that_a_column_cannot_hold_is_refused_and_nothing_is_written(value, format_, where, tmp_path):
+    bones = {"bones": [np.arange(i, dtype="i2") for i in range(6)]} if where == "beside lists" else {}
+    path = tmp_path / "scene.ply"
+    path.write_bytes(ply_bytes(columns(**bones), format_))
+    file = read_ply(path)
+    means = np.array(file.splats.means, np.float64)
+    means[4, 1] = value
+    with pytest.raises(PlyError, match=r"scene.ply cannot hold the result: y of row 4 would be"):
+        write_ply(path, file, replace(file.splats, means=means))
+    assert path.read_bytes() == ply_bytes(columns(**bones), format_) and os.listdir(tmp_path) == ["scene.ply"]
+
+
+def test_a_packed_result_beyond_single_precision_is_refused(tmp_path):
+    path = tmp_path / "scene.ply"
+    path.write_bytes(compressed_bytes(splat_columns(300, np.random.default_rng(0))))
+    file = read_ply(path)
+    means = np.array(file.splats.means, np.float64)
+    means[7, 0] = 1e39
+    with pytest.raises(PlyError, match=r"cannot hold the result: means of row 7 would not be finite"):
+        write_ply(tmp_path / "out.ply", file, replace(file.splats, means=means))
+    assert os.listdir(tmp_path) == ["scene.ply"]
 
 
 def test_spherical_harmonics_must_make_whole_degrees(tmp_path):
@@ -163,7 +250,7 @@ def test_a_file_one_may_not_read_is_refused(tmp_path, monkeypatch):
     def forbidden(*_, **__):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("builtins.open", forbidden)
+    monkeypatch.setattr("os.open", forbidden)
     with pytest.raises(PlyError, match="may not be read"):
         read_ply(tmp_path / "scene.ply")
 

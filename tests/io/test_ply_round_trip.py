@@ -195,13 +195,13 @@ def test_text_numbers_nobody_touched_keep_their_digits(tmp_path):
     assert out[-1] == lines[-2]
 
 
-def test_integer_columns_are_rounded_and_clipped(tmp_path):
+def test_integer_positions_are_rounded_and_integer_colours_clipped(tmp_path):
     columns = splat_columns(3, np.random.default_rng(0), rgb=True)
     columns["x"] = np.array([10, 20, 30], "u1")
     (tmp_path / "in.ply").write_bytes(ply_bytes(columns))
     file = read_ply(tmp_path / "in.ply")
     means, sh0 = np.array(file.splats.means), np.array(file.splats.sh0)
-    means[:, 0] = [9.6, 300, -4]
+    means[:, 0] = [9.6, 255.4, -0.4]
     sh0[0] = [0.0, 100.0, -100.0]
     write_ply(tmp_path / "out.ply", file, dataclasses.replace(file.splats, means=means, sh0=sh0))
     out = read_ply(tmp_path / "out.ply").table.columns

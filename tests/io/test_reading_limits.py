@@ -1,0 +1,138 @@
+"""Reading is linear in bytes and rows, takes no more memory than is stated, and can be stopped at any point."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import splap_editor
+from splap_editor.core.progress import Cancelled
+from splap_editor.io.ply import PlyError, read_ply
+from tests.reference.ply import compressed_bytes, ply_bytes, splat_columns
+
+MEASURED = """
+import sys
+from pathlib import Path
+import numpy as np
+from splap_editor.io.ply import PlyError, read_ply
+from splap_editor.io.list_rows import list_rows
+
+# What is compiled is no part of a file.
+list_rows(np.zeros(0, np.uint8), 0, *np.zeros((2, 0), np.int64), np.zeros(0, bool), False, np.zeros((1, 1), np.int64))
+
+def peak():
+    words = Path("/proc/self/status").read_text()
+    return int(words.partition("VmHWM:")[2].split()[0]) * 1024
+
+before = peak()
+try:
+    file = read_ply(sys.argv[1])
+except PlyError as error:
+    print(error, file=sys.stderr)
+print(peak() - before)
+"""
+BASE = 256 << 20
+N = 1 << 16
+
+
+def repeated(columns, times, **options):
+    """A file of many rows made of few."""
+    data = ply_bytes(columns, **options)
+    n = len(next(iter(columns.values())))
+    end = data.index(b"end_header") + len(b"end_header\n")
+    return data[:end].replace(b"vertex %d" % n, b"vertex %d" % (n * times)) + data[end:] * times
+
+
+def plain(format_):
+    return repeated(splat_columns(64, np.random.default_rng(0), n_rest=9), N // 64, format_=format_)
+
+
+def few_digits():
+    """Text that is short beside the numbers it stands for: doubles of one digit each."""
+    columns = {name: np.ones(64, "i4") for name in splat_columns(1, np.random.default_rng(0), n_rest=45)}
+    return repeated(columns, N // 64, format_="ascii").replace(b"property int", b"property double")
+
+
+def faces(lengths):
+    header, body = ply_bytes(splat_columns(4, np.random.default_rng(0))).split(b"end_header\n", 1)
+    rows = b"".join(bytes([n]) + bytes(n) for n in lengths)
+    times = (8 << 20) // len(rows)
+    more = b"element face %d\nproperty list uchar char v\n" % (times * len(lengths))
+    return header + more + b"end_header\n" + body + rows * times
+
+
+def lists_among_the_columns():
+    columns = splat_columns(64, np.random.default_rng(0))
+    bones = [np.arange(i % 5, dtype="i2") for i in range(64)]
+    return repeated({"x": columns.pop("x"), "bones": bones, **columns}, N // 64)
+
+
+def packed():
+    data = compressed_bytes(splat_columns(256, np.random.default_rng(0), n_rest=45))
+    end = data.index(b"end_header\n") + len(b"end_header\n")
+    times, chunk, row = N // 256, 18 * 4, 16 * 256
+    header = data[:end].replace(b"chunk 1", b"chunk %d" % times).replace(b"vertex 256", b"vertex %d" % N)
+    body = data[end:]
+    parts = body[:chunk] * times + body[chunk : chunk + row] * times + body[chunk + row :] * times
+    return header.replace(b"sh 256", b"sh %d" % N) + parts
+
+
+CASES = {
+    "binary": lambda: plain("binary_little_endian"),
+    "big endian": lambda: plain("binary_big_endian"),
+    "text": lambda: plain("ascii"),
+    "text of few digits": few_digits,
+    "packed": packed,
+    "empty faces": lambda: faces([0]),
+    "uneven faces": lambda: faces([3, 4, 3, 0, 7, 1]),
+    "lists among the columns": lists_among_the_columns,
+    "a tail of blank lines": lambda: (
+        plain("ascii")[:100_000].replace(b"vertex 65536", b"vertex 64") + b"\n" * (16 << 20)
+    ),
+    "blank lines for rows": lambda: plain("ascii").partition(b"end_header\n")[0] + b"end_header\n" + b"\n" * (48 << 20),
+}
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="the peak is asked of Linux")
+@pytest.mark.parametrize("case", CASES)
+def test_memory_stays_within_eight_times_the_file(case, tmp_path):
+    path = tmp_path / "scene.ply"
+    path.write_bytes(CASES[case]())
+    env = {**os.environ, "PYTHONPATH": str(Path(splap_editor.__file__).parents[1])}
+    done = subprocess.run(
+        [sys.executable, "-c", MEASURED, path], capture_output=True, text=True, env=env, check=True, timeout=120
+    )
+    assert int(done.stdout) <= 8 * path.stat().st_size + BASE // 4
+
+
+@pytest.mark.parametrize("case", ["binary", "text", "uneven faces", "lists among the columns"])
+def test_reading_asks_often_whether_it_shall_stop(case, tmp_path):
+    path = tmp_path / "scene.ply"
+    path.write_bytes(CASES[case]())
+    shares = []
+    file = read_ply(path, progress=shares.append)
+    assert shares == sorted(shares) and shares[-1] == 1.0
+    # At least once for each MiB that is read, and again for each that is parsed.
+    assert len(shares) >= path.stat().st_size >> 20
+    for stop in (1, len(shares) // 2, len(shares) - 1):
+        asked = []
+
+        def cancel(share, asked=asked, stop=stop):
+            asked.append(share)
+            if len(asked) == stop:
+                raise Cancelled
+
+        with pytest.raises(Cancelled):
+            read_ply(path, progress=cancel)
+    assert file.table.n_rows in (4, N)
+
+
+def test_rows_without_columns_before_lists_are_refused_at_once(tmp_path):
+    header, body = ply_bytes(splat_columns(4, np.random.default_rng(0))).split(b"element vertex", 1)
+    more = b"element a 4000000000\nelement face 1\nproperty list uchar int v\n"
+    (tmp_path / "scene.ply").write_bytes(header + more + b"element vertex" + body)
+    with pytest.raises(PlyError, match="4,000,000,000 rows of an element 'a' without a column"):
+        read_ply(tmp_path / "scene.ply")
