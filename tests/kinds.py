@@ -27,6 +27,7 @@ _KIND_OF = {
     "installation/test_system_packages.py": "window",
     "test_cli.py": "pure",
     "test_frames_cli.py": "offscreen",
+    "test_contributing.py": "pure",
     "test_kinds.py": "pure",
     "test_readme.py": "pure",
     "test_packaging.py": "pure",
