@@ -25,6 +25,8 @@ _KIND_OF = {
     "installation": "pure",
     "installation/test_readiness.py": "window",
     "installation/test_system_packages.py": "window",
+    "campaign": "pure",
+    "test_campaign.py": "pure",
     "test_cli.py": "pure",
     "test_frames_cli.py": "offscreen",
     "test_contributing.py": "pure",

@@ -37,8 +37,9 @@ def flatness(splats: Splats) -> dict[str, float]:
     """Percentiles of smallest by middle scale; 0 is a disc, 1 a ball. Two-scale splats are discs."""
     if splats.n_scales == 2:
         return {"p5": 0.0, "p50": 0.0, "p95": 0.0}
-    scales = np.sort(np.asarray(splats.log_scales, np.float64), axis=1)
+    # A signalling NaN complains when it is made wider.
     with np.errstate(invalid="ignore", over="ignore"):
+        scales = np.sort(np.asarray(splats.log_scales, np.float64), axis=1)
         ratios = np.exp(scales[:, 0] - scales[:, 1])
     ratios = ratios[np.isfinite(ratios)]
     if not ratios.size:

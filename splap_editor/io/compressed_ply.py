@@ -69,14 +69,15 @@ def packed_splats(evidence: PlyEvidence, layout: Layout) -> tuple[Splats, list[s
             rgb = _lerped(rgb, bounds, "{}_r", "{}_g", "{}_b")
     except KeyError as error:
         raise PlyError(f"{table.name} is damaged: its chunks lack {error}. Export it again.") from None
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):
         opacities = np.log(colour[:, 3]) - np.log1p(-colour[:, 3])
+        sh0 = ((rgb - 0.5) / SH_C0).astype(np.float32)
     splats = Splats(
         means=means,
         log_scales=scales,
         quats=_smallest_three(table.columns["packed_rotation"].astype(np.uint32)),
         logit_opacities=opacities,
-        sh0=((rgb - 0.5) / SH_C0).astype(np.float32),
+        sh0=sh0,
         shN=_harmonics(table),
         normal_axis=layout.normal_axis,
     )

@@ -200,6 +200,8 @@ def _parse_columns(
         if starts[hi] - starts[lo] > _BLOCK_BYTES:
             raise _damage(name, lo, f"within {_BLOCK_BYTES:,} bytes")
         text = body[starts[lo] : starts[hi]].tobytes()
+        if b"\n" not in text:
+            text = text.replace(b"\r", b"\n")
         numbers = None
         # Bytes that only some parsers take for blanks would split a line differently when it is written.
         if not text.translate(None, _NUMBER_BYTES):

@@ -88,8 +88,12 @@ def write_recipe(path: str | os.PathLike[str], recipe: Recipe) -> None:
     held = recipe_to_json(recipe)
     recipe_from_json(held)
     try:
+        data = json_lines(held).encode()
+    except UnicodeEncodeError:
+        raise RecipeError("a handle has a name that cannot be written: rename it") from None
+    try:
         with atomic_file(path) as file:
-            file.write(json_lines(held).encode())
+            file.write(data)
     except OSError as error:
         raise RecipeError(f"{path} cannot be written: {error.strerror or error}. Choose another place.") from error
 

@@ -59,7 +59,7 @@ def require_whole_degrees(held: Collection[str], names: ColumnNames, name: str) 
 def splat_columns(table: PlyTable, names: ColumnNames) -> SplatColumns:
     """Find the columns of each part of a splat."""
     held = table.columns.keys()
-    is_rgb = names.sh0[0] not in held
+    is_rgb = not set(names.sh0) <= held
     return SplatColumns(
         means=names.means,
         log_scales=names.log_scales,

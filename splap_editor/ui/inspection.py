@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 import numpy as np
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtWidgets import QWidget
 
 from splap_editor.session.graph_preview import GraphPreview
 from splap_editor.session.scene_follower import SceneFollower
@@ -18,6 +18,7 @@ from splap_editor.ui.panels.graph_panel import GraphPanel
 from splap_editor.ui.panels.inspect_panel import InspectPanel
 from splap_editor.ui.panels.quantity_panel import QuantityPanel
 from splap_editor.ui.panels.section import bring_into_view
+from splap_editor.ui.widgets.plain_text import PlainLabel
 from splap_editor.ui.widgets.quantity_legend import QuantityLegend
 from splap_editor.viewport.camera import View
 from splap_editor.viewport.graph_view import GraphView
@@ -77,7 +78,7 @@ class Inspection:
 
     def _make_widgets(self, session: Session, viewport: QWidget) -> None:
         self.legend = QuantityLegend(self.quantities, viewport)
-        self.read_out = QLabel()
+        self.read_out = PlainLabel()
         self.quantity_panel = QuantityPanel(session, self.quantities)
         self.inspect_panel = InspectPanel(session, self.inspected, self.edge_preview)
         self.inspect_panel.edge_toggled.connect(self.graph_actions.toggle_edge)

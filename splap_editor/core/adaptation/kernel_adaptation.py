@@ -69,6 +69,11 @@ class AdaptedKernels:
     @cached_property
     def quats(self) -> NDArray[np.float64]:
         """(N, 4) quaternions w, x, y, z of the file's own lengths; unchanged rows hold the file's own numbers."""
+        # Inert splats may hold anything: what is no number stays none, and is not complained of.
+        with np.errstate(invalid="ignore", over="ignore"):
+            return self._turned_quats()
+
+    def _turned_quats(self) -> NDArray[np.float64]:
         quats = np.array(self.binding.splats.quats, np.float64)
         places = np.flatnonzero(self.arrays.changed)
         rows = self.binding.order[places]
@@ -91,7 +96,8 @@ class AdaptedKernels:
         variance that would fall below the filter's own is held at 1e-12 of the effective one at rest.
         """
         splats, ellipses = self.binding.splats, self.binding.ellipses
-        log_scales = np.array(splats.log_scales, np.float64)
+        with np.errstate(invalid="ignore"):
+            log_scales = np.array(splats.log_scales, np.float64)
         nodes = np.flatnonzero(self.arrays.changed[: ellipses.n_nodes])
         entries = ellipses.rows[nodes][:, None], ellipses.axes[nodes, :2].astype(np.int64)
         growths = self.arrays.growths[nodes]

@@ -17,6 +17,7 @@ from splap_editor.session.documents import Documents
 from splap_editor.session.session import Session
 from splap_editor.ui.dialogs.export_dialog import ExportDialog
 from splap_editor.ui.dialogs.picture_dialog import PictureDialog
+from splap_editor.ui.widgets.plain_text import PlainMessageBox
 from splap_editor.ui.widgets.toast import Toast
 from splap_editor.viewport.viewport import Viewport
 
@@ -145,7 +146,7 @@ class FileActions:
             then()
             return
         scene = self._session.scene
-        box = QMessageBox(
+        box = PlainMessageBox(
             QMessageBox.Icon.NoIcon,
             "Save the edit?",
             f"The edit of {scene.file.path.name} has not been saved.",
@@ -193,7 +194,7 @@ class FileActions:
         self._toast.fail(f"{title} failed: {sentence(error)}", **buttons)
 
     def _show_details(self, title: str, error: Exception) -> None:
-        box = QMessageBox(QMessageBox.Icon.NoIcon, title, f"{title} failed.", parent=self._window)
+        box = PlainMessageBox(QMessageBox.Icon.NoIcon, title, f"{title} failed.", parent=self._window)
         box.setInformativeText("This is a fault of the program. The text below helps to mend it.")
         box.setDetailedText("".join(traceback.format_exception(error)))
         box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)

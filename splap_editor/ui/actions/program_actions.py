@@ -10,6 +10,7 @@ from splap_editor.ui.dialogs.action_palette import ActionPalette
 from splap_editor.ui.dialogs.help_sheet import HelpSheet
 from splap_editor.ui.dialogs.preferences_dialog import PreferencesDialog
 from splap_editor.ui.preferences import PreferenceStore
+from splap_editor.ui.widgets.plain_text import PlainMessageBox
 
 
 class ProgramActions:
@@ -42,7 +43,7 @@ class ProgramActions:
 
     def about(self) -> None:
         """Say what this is."""
-        box = QMessageBox(
+        box = PlainMessageBox(
             QMessageBox.Icon.NoIcon,
             "About SpLap Editor",
             f"SpLap Editor {splap_editor.__version__}",

@@ -6,6 +6,8 @@ from pathlib import Path
 from PySide6.QtCore import QSettings
 from PySide6.QtWidgets import QMenu, QWidget
 
+from splap_editor.ui.widgets.plain_text import set_plain_tip
+
 N_RECENT = 10
 
 
@@ -39,7 +41,7 @@ class RecentFiles(QMenu):
         self.clear()
         for path in self.paths:
             action = self.addAction(path.name.replace("&", "&&"))
-            action.setToolTip(str(path))
+            set_plain_tip(action, str(path))
             action.triggered.connect(lambda checked=False, path=path: self._open_path(path))
         self.setToolTipsVisible(True)
         if not self.isEmpty():

@@ -11,7 +11,6 @@ from PySide6.QtWidgets import (
     QDialogButtonBox,
     QFileDialog,
     QHBoxLayout,
-    QLabel,
     QLineEdit,
     QPushButton,
     QVBoxLayout,
@@ -22,6 +21,7 @@ from splap_editor.session.scene import Scene
 from splap_editor.ui.theme import STEP
 from splap_editor.ui.widgets.columns_list import ColumnsList
 from splap_editor.ui.widgets.number_field import set_tone
+from splap_editor.ui.widgets.plain_text import PlainLabel
 
 
 class ExportDialog(QDialog):
@@ -41,11 +41,11 @@ class ExportDialog(QDialog):
         line.addWidget(self.path_field, 1)
         line.addWidget(browse)
         n = scene.splats.n_splats
-        facts = QLabel(
+        facts = PlainLabel(
             f"{n:,} splats in the file's own order and layout; rows that did not move stay as they are.", wordWrap=True
         )
         facts.setProperty("tone", "quiet")
-        self.note = QLabel(wordWrap=True)
+        self.note = PlainLabel(wordWrap=True)
         self.third_scale = QCheckBox("Add a thin third scale, for viewers that only know 3DGS")
         self.third_scale.setVisible(scene.splats.n_scales == 2)
         self.columns = ColumnsList(lacks)

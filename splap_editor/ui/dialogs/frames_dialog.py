@@ -23,6 +23,7 @@ from splap_editor.ui.theme import STEP
 from splap_editor.ui.timeline.frame_export import FrameOrder
 from splap_editor.ui.widgets.number_field import NumberField
 from splap_editor.ui.widgets.options_form import form_label
+from splap_editor.ui.widgets.plain_text import PlainLabel
 from splap_editor.viewport.screenshot import LARGEST_PX
 
 KINDS = {"ply": "A PLY for each frame", "pictures": "A picture of each frame", "turntable": "Pictures all round"}
@@ -78,9 +79,9 @@ class FramesDialog(QDialog):
         grid.setHorizontalSpacing(3 * STEP)
         grid.setVerticalSpacing(2 * STEP)
         self._add_row(grid, "kind", "What", self.kind)
-        self._add_row(grid, "frames", "Frames", self.first, QLabel("to"), self.last)
+        self._add_row(grid, "frames", "Frames", self.first, PlainLabel("to"), self.last)
         self._add_row(grid, "number", "Pictures", self.number)
-        self._add_row(grid, "size", "Size", self.width_field, QLabel("×"), self.height_field)
+        self._add_row(grid, "size", "Size", self.width_field, PlainLabel("×"), self.height_field)
         self._add_row(grid, "transparent", "", self.transparent)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(5 * STEP, 5 * STEP, 5 * STEP, 4 * STEP)

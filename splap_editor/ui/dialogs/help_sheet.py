@@ -3,11 +3,12 @@
 from collections.abc import Iterable
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QDialog, QGridLayout, QHBoxLayout, QLabel, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDialog, QGridLayout, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
 from splap_editor.ui.actions.action_spec import ActionSpec
 from splap_editor.ui.gestures import key_blocks
 from splap_editor.ui.theme import STEP
+from splap_editor.ui.widgets.plain_text import PlainLabel
 
 COLUMN_PX = 400
 
@@ -59,12 +60,12 @@ def _block(title: str, rows: list[tuple[str, str]]) -> QGridLayout:
     grid.setHorizontalSpacing(4 * STEP)
     grid.setVerticalSpacing(STEP)
     grid.setColumnStretch(1, 1)
-    head = QLabel(title)
+    head = PlainLabel(title)
     head.setProperty("tone", "title")
     grid.addWidget(head, 0, 0, 1, 2)
     for row, (keys, what) in enumerate(rows, start=1):
-        cap = QLabel(keys)
+        cap = PlainLabel(keys)
         cap.setObjectName("keyCap")
         grid.addWidget(cap, row, 0, Qt.AlignmentFlag.AlignLeft)
-        grid.addWidget(QLabel(what), row, 1)
+        grid.addWidget(PlainLabel(what), row, 1)
     return grid

@@ -12,7 +12,6 @@ from PySide6.QtWidgets import (
     QFileDialog,
     QGridLayout,
     QHBoxLayout,
-    QLabel,
     QVBoxLayout,
     QWidget,
 )
@@ -20,6 +19,7 @@ from PySide6.QtWidgets import (
 from splap_editor.ui.theme import STEP
 from splap_editor.ui.widgets.number_field import NumberField
 from splap_editor.ui.widgets.options_form import form_label
+from splap_editor.ui.widgets.plain_text import PlainLabel
 from splap_editor.ui.widgets.toast import Toast
 from splap_editor.viewport.screenshot import LARGEST_PX, screenshot
 from splap_editor.viewport.viewport import Viewport
@@ -50,7 +50,7 @@ class PictureDialog(QDialog):
         buttons.rejected.connect(self.reject)
         size_row = QHBoxLayout()
         size_row.addWidget(self.width_field, 1)
-        size_row.addWidget(QLabel("×"))
+        size_row.addWidget(PlainLabel("×"))
         size_row.addWidget(self.height_field, 1)
         grid = QGridLayout()
         grid.setHorizontalSpacing(3 * STEP)

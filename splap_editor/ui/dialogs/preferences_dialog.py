@@ -1,10 +1,11 @@
 """The preferences page."""
 
-from PySide6.QtWidgets import QDialog, QDialogButtonBox, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDialog, QDialogButtonBox, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from splap_editor.ui.preferences import MB, RANGES, PreferenceStore
 from splap_editor.ui.theme import STEP
 from splap_editor.ui.widgets.options_form import FieldHint, OptionsForm
+from splap_editor.ui.widgets.plain_text import PlainLabel
 
 HINTS = {
     "navigation": FieldHint(
@@ -43,7 +44,7 @@ class PreferencesDialog(QDialog):
         self._store = store
         self.form = OptionsForm(store.held, HINTS)
         self.form.changed.connect(store.set)
-        self.cache = QLabel()
+        self.cache = PlainLabel()
         self.cache.setProperty("tone", "quiet")
         self.clear = QPushButton("Clear", autoDefault=False)
         self.clear.clicked.connect(self._on_clear)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 from PySide6.QtCore import QEvent, QObject, Signal
-from PySide6.QtWidgets import QCheckBox, QGridLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QCheckBox, QGridLayout, QVBoxLayout, QWidget
 
 from splap_editor.core.adaptation.options import AdaptationOptions
 from splap_editor.core.deformers import DEFORMERS, method_titles
@@ -19,6 +19,7 @@ from splap_editor.ui.theme import STEP
 from splap_editor.ui.widgets.choices import Choice
 from splap_editor.ui.widgets.number_field import NumberField, set_tone
 from splap_editor.ui.widgets.options_form import OptionsForm, form_label
+from splap_editor.ui.widgets.plain_text import PlainLabel
 
 _REACH = options_of(ReachOptions)["free_radius"]
 
@@ -34,8 +35,8 @@ class DeformerPanel(QWidget):
         self._session = session
         self._scene: Scene | None = None
         edit = Edit()
-        self.state = QLabel(wordWrap=True)
-        self.timing = QLabel()
+        self.state = PlainLabel(wordWrap=True)
+        self.timing = PlainLabel()
         self.timing.setProperty("tone", "quiet")
         self.method = Choice()
         for name, words in method_titles().items():

@@ -27,6 +27,7 @@ from splap_editor.ui.actions.graph_actions import GraphActions
 from splap_editor.ui.theme import STEP
 from splap_editor.ui.widgets.number_field import set_tone
 from splap_editor.ui.widgets.options_form import FieldHint, OptionsForm
+from splap_editor.ui.widgets.plain_text import PlainLabel
 from splap_editor.viewport.graph_view import EDGE_COLORS, GraphView
 
 MOST_LISTED = 60
@@ -223,7 +224,7 @@ def _pieces(n: int) -> str:
 
 
 def _label() -> QLabel:
-    label = QLabel(wordWrap=True)
+    label = PlainLabel(wordWrap=True)
     label.setProperty("tone", "quiet")
     return label
 

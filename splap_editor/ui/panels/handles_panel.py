@@ -9,7 +9,6 @@ from PySide6.QtWidgets import (
     QColorDialog,
     QFrame,
     QHBoxLayout,
-    QLabel,
     QLineEdit,
     QPushButton,
     QToolButton,
@@ -25,6 +24,7 @@ from splap_editor.session.session import Session
 from splap_editor.ui.panels.cage_form import CageForm
 from splap_editor.ui.panels.pose_form import PoseForm
 from splap_editor.ui.theme import STEP, icon
+from splap_editor.ui.widgets.plain_text import PlainLabel
 
 
 class HandlesPanel(QWidget):
@@ -35,7 +35,9 @@ class HandlesPanel(QWidget):
         self._session = session
         self._scene: Scene | None = None
         self._rows: dict[int, HandleRow] = {}
-        self._empty = QLabel("Pick the Handle tool and click the surface, or select splats and press H.", wordWrap=True)
+        self._empty = PlainLabel(
+            "Pick the Handle tool and click the surface, or select splats and press H.", wordWrap=True
+        )
         self._empty.setProperty("tone", "quiet")
         self._list = QVBoxLayout()
         self._list.setSpacing(0)
@@ -44,7 +46,7 @@ class HandlesPanel(QWidget):
         self.pose_form.previewed.connect(lambda pose: self._preview(pose))
         self.cage_form = CageForm()
         self.cage_form.changed.connect(self._on_cage_changed)
-        self._pins = QLabel()
+        self._pins = PlainLabel()
         self._pins.setProperty("tone", "quiet")
         self._clear_pins = QPushButton("Clear")
         self._clear_pins.setFlat(True)

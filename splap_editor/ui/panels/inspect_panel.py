@@ -16,6 +16,7 @@ from splap_editor.ui.theme import STEP
 from splap_editor.ui.widgets.choices import Choice
 from splap_editor.ui.widgets.number_field import NumberField
 from splap_editor.ui.widgets.options_form import form_label
+from splap_editor.ui.widgets.plain_text import PlainLabel
 from splap_editor.viewport.inspect_view import BOTH_COLOR, FIRST_COLOR, SECOND_COLOR, InspectView
 
 HINT = "Take the Inspect tool (I) and click a splat."
@@ -222,4 +223,4 @@ def _kind_combo(tip: str, none: str = "") -> QComboBox:
 
 
 def _text_label() -> QLabel:
-    return QLabel(wordWrap=True, textInteractionFlags=Qt.TextInteractionFlag.TextSelectableByMouse)
+    return PlainLabel(wordWrap=True, textInteractionFlags=Qt.TextInteractionFlag.TextSelectableByMouse)

@@ -2,7 +2,7 @@
 
 import numpy as np
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from splap_editor.session.detective import Oddity, oddities
 from splap_editor.session.latest_job import LatestJob
@@ -10,6 +10,7 @@ from splap_editor.session.scene import Scene
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.ui.theme import STEP
+from splap_editor.ui.widgets.plain_text import PlainLabel
 
 
 class OdditiesList(QWidget):
@@ -24,7 +25,7 @@ class OdditiesList(QWidget):
         self._list = QVBoxLayout(self)
         self._list.setContentsMargins(0, 0, 0, 0)
         self._list.setSpacing(STEP)
-        self.status = QLabel()
+        self.status = PlainLabel()
         self.status.setProperty("tone", "quiet")
         self._list.addWidget(self.status)
         # A scene that is gone need not be looked through to the end.
@@ -58,7 +59,7 @@ class OdditiesList(QWidget):
             row = QWidget()
             line = QHBoxLayout(row)
             line.setContentsMargins(0, 0, 0, 0)
-            line.addWidget(QLabel(oddity.sentence, wordWrap=True), 1)
+            line.addWidget(PlainLabel(oddity.sentence, wordWrap=True), 1)
             button = QPushButton("Select", flat=True)
             button.clicked.connect(lambda _=False, oddity=oddity: self._select(scene, oddity))
             line.addWidget(button, 0, Qt.AlignmentFlag.AlignTop)

@@ -3,12 +3,13 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QWidget
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QWidget
 
 from splap_editor.core.splats.rotations import matrices_to_quats, quats_to_matrices
 from splap_editor.engine.edit import Pose
 from splap_editor.ui.theme import STEP
 from splap_editor.ui.widgets.number_field import NumberField, ScrubLabel
+from splap_editor.ui.widgets.plain_text import PlainLabel
 
 AXIS_COLORS = ("#f2746b", "#8fcf5f", "#6ea8ff")
 
@@ -68,14 +69,14 @@ class PoseForm(QWidget):
         self.rotate = [NumberField(-360, 360, decimals=2, step=1, unit="°") for _ in range(3)]
         self.scales = [NumberField(0.01, 100, decimals=3, step=0.01) for _ in range(3)]
         for axis, (name, color) in enumerate(zip("XYZ", AXIS_COLORS, strict=True)):
-            head = QLabel(f'<span style="color:{color}">{name}</span>')
+            head = PlainLabel(name, styleSheet=f"color: {color};")
             grid.addWidget(head, 0, axis + 1)
             grid.setColumnStretch(axis + 1, 1)
             grid.addLayout(self._cell(self.translate[axis], color), 1, axis + 1)
             grid.addLayout(self._cell(self.rotate[axis], color), 2, axis + 1)
             grid.addLayout(self._cell(self.scales[axis], color), 3, axis + 1)
         for row, text in enumerate(("Move", "Rotate", "Scale"), start=1):
-            label = QLabel(text)
+            label = PlainLabel(text)
             label.setProperty("tone", "quiet")
             grid.addWidget(label, row, 0)
         for field in (*self.translate, *self.rotate, *self.scales):

@@ -1,7 +1,7 @@
 """Which quantity colours the splats, by which map, and its histogram."""
 
 import numpy as np
-from PySide6.QtWidgets import QCheckBox, QComboBox, QGridLayout, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QCheckBox, QComboBox, QGridLayout, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from splap_editor.engine.quantities import QUANTITIES
 from splap_editor.session.scene_follower import SceneFollower
@@ -12,6 +12,7 @@ from splap_editor.ui.widgets.choices import Choice
 from splap_editor.ui.widgets.histogram import Histogram
 from splap_editor.ui.widgets.number_field import NumberField
 from splap_editor.ui.widgets.options_form import form_label
+from splap_editor.ui.widgets.plain_text import PlainLabel
 from splap_editor.viewport.colormaps import COLORMAPS
 from splap_editor.viewport.quantity_view import QuantityView
 
@@ -35,7 +36,7 @@ class QuantityPanel(QWidget):
         self.colormap.currentIndexChanged.connect(lambda index: view.set(colormap=self.colormap.itemData(index)))
         self.log = QCheckBox("Log", toolTip="Equal ratios take equal shares of the colours")
         self.log.toggled.connect(lambda on: view.set(is_log=on, low=None, high=None))
-        self.lack = QLabel(wordWrap=True)
+        self.lack = PlainLabel(wordWrap=True)
         self.lack.setProperty("tone", "quiet")
         self.histogram = Histogram()
         self.histogram.picking.connect(self._preview)

@@ -13,6 +13,7 @@ from splap_editor.ui.panels.oddities_list import OdditiesList
 from splap_editor.ui.theme import STEP
 from splap_editor.ui.widgets.number_field import set_tone
 from splap_editor.ui.widgets.options_form import form_label
+from splap_editor.ui.widgets.plain_text import PlainLabel, set_plain_tip
 
 ROWS = {
     "file": "File",
@@ -44,14 +45,14 @@ class ScenePanel(QWidget):
         grid.setColumnStretch(1, 1)
         self.facts: dict[str, QLabel] = {}
         for row, (name, text) in enumerate(ROWS.items()):
-            value = QLabel(wordWrap=True, textInteractionFlags=Qt.TextInteractionFlag.TextSelectableByMouse)
+            value = PlainLabel(wordWrap=True, textInteractionFlags=Qt.TextInteractionFlag.TextSelectableByMouse)
             label = form_label(text, value)
             label.setMinimumWidth(0)
             label.setAlignment(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft)
             grid.addWidget(label, row, 0)
             grid.addWidget(value, row, 1)
             self.facts[name] = value
-        self.warnings = QLabel(wordWrap=True)
+        self.warnings = PlainLabel(wordWrap=True)
         self.warnings.setProperty("tone", "warning")
         layout = QVBoxLayout(self)
         layout.setSpacing(2 * STEP)
@@ -76,7 +77,7 @@ class ScenePanel(QWidget):
         splats, file = scene.splats, scene.file
         n_inert = splats.n_splats - scene.ellipses.n_nodes
         self.facts["file"].setText(file.path.name)
-        self.facts["file"].setToolTip(str(file.path))
+        set_plain_tip(self.facts["file"], str(file.path))
         self.facts["layout"].setText(f"{file.layout.name}: {file.layout.reason}")
         inert = f", {n_inert:,} too faint or broken to shape the surface" if n_inert else ""
         self.facts["splats"].setText(f"{splats.n_splats:,}{inert}")

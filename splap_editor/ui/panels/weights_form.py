@@ -8,6 +8,7 @@ from splap_editor.session.session import Session
 from splap_editor.session.weight_report import weight_lines
 from splap_editor.ui.theme import STEP
 from splap_editor.ui.widgets.number_field import set_tone
+from splap_editor.ui.widgets.plain_text import PlainLabel
 
 
 class WeightsForm(QWidget):
@@ -43,7 +44,7 @@ class WeightsForm(QWidget):
         bound = self._session.bound
         lines = weight_lines(bound.edit, bound.deformer.report) if bound and bound.edit.deformer.has_weights else []
         while len(self.labels) < len(lines):
-            label = QLabel(wordWrap=True, textInteractionFlags=Qt.TextInteractionFlag.TextSelectableByMouse)
+            label = PlainLabel(wordWrap=True, textInteractionFlags=Qt.TextInteractionFlag.TextSelectableByMouse)
             self._lines.addWidget(label)
             self.labels.append(label)
         while len(self.labels) > len(lines):

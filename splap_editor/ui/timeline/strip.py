@@ -1,7 +1,7 @@
 """The strip under the picture: play, keys, frames."""
 
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QToolButton, QWidget
 
 from splap_editor.engine.timeline import LAST_FRAME
 from splap_editor.session.scene_follower import SceneFollower
@@ -11,6 +11,7 @@ from splap_editor.ui.actions.timeline_actions import TimelineActions
 from splap_editor.ui.theme import STEP
 from splap_editor.ui.timeline.ruler import TimelineRuler
 from splap_editor.ui.widgets.number_field import NumberField
+from splap_editor.ui.widgets.plain_text import PlainLabel
 
 
 class TimelineStrip(QWidget):
@@ -47,9 +48,9 @@ class TimelineStrip(QWidget):
         layout.addWidget(self.frame_field)
         layout.addWidget(self.ruler, 1)
         layout.addWidget(self.length_field)
-        layout.addWidget(QLabel("at"))
+        layout.addWidget(PlainLabel("at"))
         layout.addWidget(self.fps_field)
-        layout.addWidget(QLabel("fps"))
+        layout.addWidget(PlainLabel("fps"))
         self.ruler.scrubbed.connect(timeline.scrub)
         self.ruler.chosen.connect(timeline.go_to)
         self.ruler.key_moved.connect(timeline.move_key)

@@ -1,11 +1,12 @@
 """One line for the background work: what, how far, Cancel; a sentence when it failed."""
 
 from PySide6.QtCore import QTimer, Signal
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QPushButton, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QProgressBar, QPushButton, QWidget
 
 from splap_editor.session.jobs import Job
 from splap_editor.session.session import Session
 from splap_editor.ui.theme import STEP
+from splap_editor.ui.widgets.plain_text import PlainLabel
 
 SHOW_AFTER_MS = 250
 """A job shorter than this is not worth a look."""
@@ -37,7 +38,7 @@ class JobBar(QWidget):
         super().__init__(parent)
         self._session = session
         self._job: Job | None = None
-        self._text = QLabel()
+        self._text = PlainLabel()
         self._bar = QProgressBar(textVisible=False, maximum=1000)
         self._bar.setFixedSize(160, 6)
         self._button = QPushButton("Cancel")

@@ -2,7 +2,9 @@
 
 from PySide6.QtCore import QEvent, QPoint, Qt, Signal
 from PySide6.QtGui import QEnterEvent, QKeyEvent, QMouseEvent, QWheelEvent
-from PySide6.QtWidgets import QDoubleSpinBox, QLabel, QWidget
+from PySide6.QtWidgets import QDoubleSpinBox, QWidget
+
+from splap_editor.ui.widgets.plain_text import PlainLabel
 
 
 class NumberField(QDoubleSpinBox):
@@ -69,7 +71,7 @@ class NumberField(QDoubleSpinBox):
             event.ignore()
 
 
-class ScrubLabel(QLabel):
+class ScrubLabel(PlainLabel):
     """A label that changes its number when dragged sideways: a step each few pixels, finer with Shift.
 
     `started` comes before the first change, `finished` after the last.

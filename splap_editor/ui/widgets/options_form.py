@@ -11,6 +11,7 @@ from splap_editor.core.options import Option, options_of
 from splap_editor.ui.theme import STEP
 from splap_editor.ui.widgets.choices import Choice
 from splap_editor.ui.widgets.number_field import NumberField
+from splap_editor.ui.widgets.plain_text import PlainLabel
 
 LABEL_PX = 84
 """All labels in front of fields are as wide, so that fields of several forms line up."""
@@ -163,7 +164,7 @@ def _round(number: float) -> float:
 
 def form_label(text: str, buddy: QWidget) -> QLabel:
     """Quiet label in front of a field."""
-    label = QLabel(text)
+    label = PlainLabel(text)
     label.setProperty("tone", "quiet")
     label.setBuddy(buddy)
     label.setMinimumWidth(LABEL_PX)

@@ -4,12 +4,13 @@ from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QWidget
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QWidget
 
 from splap_editor.session.autosave import Autosave
 from splap_editor.session.crash_report import new_crash_reports
 from splap_editor.session.recovery import Orphan
 from splap_editor.ui.theme import STEP, icon
+from splap_editor.ui.widgets.plain_text import PlainLabel
 
 
 class RecoveryBar(QFrame):
@@ -31,7 +32,7 @@ class RecoveryBar(QFrame):
         self._leave = leave
         self._orphans: list[Orphan] = []
         self._notes: list[str] = []
-        self._text = QLabel(wordWrap=True)
+        self._text = PlainLabel(wordWrap=True)
         self.restore_button = QPushButton("Restore")
         self.restore_button.clicked.connect(lambda: self._leave(self._restore))
         self.discard_button = QPushButton("Discard")
@@ -40,7 +41,7 @@ class RecoveryBar(QFrame):
         self.close_button = QPushButton("Close")
         self.close_button.setFlat(True)
         self.close_button.clicked.connect(self.release)
-        mark = QLabel()
+        mark = PlainLabel()
         mark.setPixmap(icon("warning").pixmap(16, 16))
         layout = QHBoxLayout(self)
         layout.setContentsMargins(3 * STEP, STEP, 3 * STEP, STEP)

@@ -1,11 +1,12 @@
 """The right end of the status bar: hint of the tool, counts."""
 
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.tools.tool_manager import ToolManager
 from splap_editor.ui.theme import STEP
+from splap_editor.ui.widgets.plain_text import PlainLabel
 
 
 class StateLine(QWidget):
@@ -15,9 +16,9 @@ class StateLine(QWidget):
         super().__init__(parent)
         self._session = session
         self._tools = tools
-        self.hint = QLabel()
+        self.hint = PlainLabel()
         self.hint.setProperty("tone", "quiet")
-        self.counts = QLabel()
+        self.counts = PlainLabel()
         layout = QHBoxLayout(self)
         layout.setContentsMargins(2 * STEP, STEP, 3 * STEP, STEP)
         layout.setSpacing(6 * STEP)

@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QLabel, QToolButton, QWidget
+from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QToolButton, QWidget
 
 from splap_editor.tools.tool import Held
 from splap_editor.tools.tool_manager import ToolManager
@@ -13,6 +13,7 @@ from splap_editor.ui.actions.actions import ActionSet
 from splap_editor.ui.theme import STEP
 from splap_editor.ui.widgets.number_field import NumberField, ScrubLabel
 from splap_editor.ui.widgets.options_form import FieldHint, hints_of
+from splap_editor.ui.widgets.plain_text import PlainLabel
 
 TITLES = {entry.name: entry.title for entry in TOOLS}
 
@@ -31,7 +32,7 @@ class ToolOptionsBar(QWidget):
         self.setObjectName("headerBar")
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self._tools = tools
-        self._title = QLabel()
+        self._title = PlainLabel()
         self._title.setMinimumWidth(64)
         self._title.setStyleSheet("font-weight: 600;")
         kinds = dict.fromkeys(kind for tool in tools.tools.values() for kind in tool.option_kinds)

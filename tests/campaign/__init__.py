@@ -1,0 +1,1 @@
+"""A search for inputs and moments that break something: ``python -m tests.campaign [--minutes N] [--seed S]``."""

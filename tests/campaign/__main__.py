@@ -1,0 +1,59 @@
+"""Search as long as there is time, and say what was tried and what broke."""
+
+import argparse
+import os
+import sys
+import threading
+from collections import Counter
+from time import monotonic
+
+from tests.campaign.inputs import Found, try_inputs
+from tests.campaign.writes import try_writes
+
+FAR = 1 << 40
+
+
+def campaign(minutes: float, seed: int, n_workers: int, n_writes: int) -> tuple[Counter, list[str]]:
+    """Cut off writes, then try inputs on some processes side by side."""
+    until = monotonic() + 60.0 * minutes
+    counts: Counter = Counter()
+    failures: list[str] = []
+    if hasattr(os, "fork"):
+        try_writes(seed, n_writes, counts, failures)
+    found = [Found() for _ in range(n_workers)]
+    numbers = [range(which, FAR, n_workers) for which in range(n_workers)]
+    # Each thread waits for a process of its own.
+    threads = [
+        threading.Thread(target=try_inputs, args=(seed, those, until, held))
+        for those, held in zip(numbers, found, strict=True)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for held in found:
+        counts += held.counts
+        failures += held.failures
+    return counts, failures
+
+
+def main() -> int:
+    """Run from the command line; 1 if anything broke."""
+    parser = argparse.ArgumentParser(prog="python -m tests.campaign", description=__doc__)
+    parser.add_argument("--minutes", type=float, default=10.0)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--writes", type=int, default=900, help="writes to cut off, a third of them by each way")
+    options = parser.parse_args()
+    counts, failures = campaign(options.minutes, options.seed, options.workers, options.writes)
+    for failure in failures:
+        print(failure, end="\n\n")
+    for name in ("inputs", "crashes", "tracebacks", "hangs", "kills", "failed writes", "power losses", "files broken"):
+        print(f"{counts.pop(name, 0):>9,} {name}")
+    for name, count in sorted(counts.items()):
+        print(f"{count:>9,} {name}")
+    return bool(failures)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

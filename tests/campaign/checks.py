@@ -1,0 +1,131 @@
+"""What must hold of any input: it is refused in a sentence, or it is read and everything after works."""
+
+import dataclasses
+import struct
+import zlib
+from pathlib import Path
+
+import numpy as np
+
+from splap_editor.core.adaptation.kernel_adaptation import adapted_splats
+from splap_editor.core.deformer import UnconstrainedComponentError
+from splap_editor.core.handle_nodes import Region
+from splap_editor.core.pose import Pose
+from splap_editor.engine.bound_edit import bind
+from splap_editor.engine.cache import _HEAD, _MAGIC, StageCache
+from splap_editor.engine.edit import Edit, Handle
+from splap_editor.engine.scene_info import scene_info
+from splap_editor.engine.surface import surface_of
+from splap_editor.io.ply import PlyError, SplatFile, read_ply, write_ply
+from splap_editor.io.recipe import RecipeError, read_recipe, write_recipe
+from splap_editor.io.session_file import SessionFileError, read_session_file, write_session_file
+from splap_editor.io.thresholds import Thresholds, read_thresholds
+
+SHIFT = np.array([1.0, 2.0, -1.0])
+"""Whole, for columns of whole numbers."""
+
+
+def check_ply(path: Path, number: int) -> bool:
+    """Whether a splat file is accepted; then it goes out as it came in, and comes back after an edit."""
+    try:
+        file = read_ply(path)
+    except PlyError as error:
+        assert path.name in str(error) and str(error).endswith((".", "?")), f"no sentence: {error}"
+        return False
+    out = path.with_name("out.ply")
+    write_ply(out, file, file.splats)
+    assert out.read_bytes() == path.read_bytes(), "an unedited file is not what it was"
+    _check_edited(out, file)
+    scene_info(file)
+    if number % 40 == 0:
+        _check_deformed(out, file)
+    return True
+
+
+def _check_edited(out: Path, file: SplatFile) -> None:
+    splats = file.splats
+    edited = dataclasses.replace(splats, means=np.asarray(splats.means, np.float64) + SHIFT)
+    try:
+        write_ply(out, file, edited)
+    except PlyError as error:
+        assert "cannot hold the result" in str(error), error
+        return
+    again = read_ply(out)
+    assert again.splats.n_splats == splats.n_splats
+    size = 1e-5 * (np.abs(np.asarray(splats.means, np.float64)).max() + 1.0)
+    assert np.abs(again.splats.means - edited.means).max() <= size, "the edit is not in the file"
+
+
+def _check_deformed(out: Path, file: SplatFile) -> None:
+    center = np.asarray(file.splats.means[0], np.float64)
+    handle = Handle(1, "one", "#ffffff", Region(center, 0.0, np.array([0])), Pose((0.5, 0.0, 0.0)))
+    try:
+        edit = Edit(handles=(handle,))
+        kernels = bind(surface_of(file.splats, edit.graph), edit).pose().kernels
+        write_ply(out, file, adapted_splats(file.splats, kernels))
+    except (UnconstrainedComponentError, PlyError):
+        return
+    except ValueError as error:
+        # What cannot be deformed says so.
+        assert "splat" in str(error) or "handle" in str(error), error
+        return
+    read_ply(out)
+
+
+def check_recipe(path: Path, number: int) -> bool:
+    """Whether a recipe is accepted; then it is written and read as the same."""
+    try:
+        held = read_recipe(path)
+    except RecipeError as error:
+        assert path.name in str(error), f"no sentence: {error}"
+        return False
+    again = path.with_name("again.json")
+    try:
+        write_recipe(again, held)
+    except RecipeError as error:
+        assert "name that cannot be written" in str(error), error
+        return True
+    assert read_recipe(again) == held
+    return True
+
+
+def check_session(path: Path, number: int) -> bool:
+    """Whether a session is accepted; then it is written and read as the same."""
+    try:
+        held = read_session_file(path)
+    except SessionFileError as error:
+        assert path.name in str(error), f"no sentence: {error}"
+        return False
+    again = path.with_name("again.splap")
+    try:
+        write_session_file(again, held)
+    except SessionFileError as error:
+        assert "name that can be written" in str(error), error
+        return True
+    assert read_session_file(again).recipe == held.recipe
+    return True
+
+
+def check_npz(path: Path, number: int) -> bool:
+    """Whether an archive is accepted as thresholds."""
+    found = read_thresholds(path, 12)
+    assert isinstance(found, Thresholds) or path.name in found
+    return isinstance(found, Thresholds)
+
+
+def check_cache(path: Path, number: int) -> bool:
+    """Whether a cache entry is taken: only if its check sum is right, which half of these are given."""
+    data = path.read_bytes()
+    cache = StageCache(path.with_name("cache"))
+    cache.folder.mkdir(exist_ok=True)
+    head = _HEAD.pack(_MAGIC, len(data), zlib.crc32(data)) if number % 2 else data[: _HEAD.size]
+    (cache.folder / "key.npz").write_bytes(head + data)
+    try:
+        found = cache.load("key", dict)
+    except struct.error as error:
+        raise AssertionError("an entry's bytes escaped as an error") from error
+    assert (found is not None) == (cache.folder / "key.npz").exists()
+    return found is not None
+
+
+CHECKS = {"ply": check_ply, "recipe": check_recipe, "session": check_session, "npz": check_npz, "cache": check_cache}

@@ -1,0 +1,157 @@
+"""Changes to a file: to what its format means, and to its bytes. Each is a function of the bytes and a generator."""
+
+import json
+import re
+from collections.abc import Callable
+
+import numpy as np
+
+Mutation = Callable[[bytes, np.random.Generator], bytes]
+
+NUMBERS = (
+    *("0", "-1", "1", "255", "256", "65536", "2147483647", "2147483648", "4294967295", "4000000000", "1e9", "1e39"),
+    *("-1e300", "1e400", "nan", "inf", "-inf", "-0.0", "1e-320", "9" * 20, "9" * 5000, "", "0x10", "1_0", "१२"),
+)
+WORDS = (
+    *("float", "double", "uchar", "char", "int", "uint", "short", "list", "property", "element", "vertex", "face"),
+    *("chunk", "sh", "x", "rot_0", "opacity", "scale_0", "f_dc_0", "packed_position", "comment", "end_header"),
+    *("ascii", "binary_little_endian", "binary_big_endian", "format", "ply", "<img src='/dev/zero'>", "\xa0", "\x00"),
+)
+VALUES = (
+    *(None, True, False, 0, -1, 1, 2**31, 2**63, 10**300, 1e39, 1e300, -1e-300, float("nan"), float("inf"), "", "x"),
+    *("../../etc/passwd", "\x00", "\ud800", [], {}, [[]], [0] * 3, [1e39] * 3, [0] * 4, [[0, 0]], {"a": {}}, "A" * 999),
+)
+
+
+def flip_bits(data: bytes, rng: np.random.Generator) -> bytes:
+    """A few bits anywhere."""
+    held = bytearray(data)
+    for at in rng.integers(0, max(len(held), 1), int(rng.integers(1, 9))):
+        if held:
+            held[at] ^= 1 << int(rng.integers(8))
+    return bytes(held)
+
+
+def truncate(data: bytes, rng: np.random.Generator) -> bytes:
+    """Cut short, near the end as often as anywhere."""
+    return data[: int(rng.integers(0, len(data) + 1))] if rng.integers(2) else data[: -int(rng.integers(1, 40))]
+
+
+def repeat_or_drop(data: bytes, rng: np.random.Generator) -> bytes:
+    """A stretch twice, gone, or somewhere else."""
+    lo, hi = sorted(rng.integers(0, len(data) + 1, 2).tolist())
+    how = int(rng.integers(3))
+    if how == 0:
+        return data[:hi] + data[lo:]
+    if how == 1:
+        return data[:lo] + data[hi:]
+    at = int(rng.integers(0, lo + 1))
+    return data[:at] + data[lo:hi] + data[at:lo] + data[hi:]
+
+
+def odd_bytes(data: bytes, rng: np.random.Generator) -> bytes:
+    """Bytes that parsers disagree about, put in somewhere."""
+    odd = (b"\x00", b"\r", b"\n", b"\xc2\xa0", b"\x0b", b"\xff\xfe", b" ", b"\x7f\x80", b"\xef\xbb\xbf", bytes(64))
+    at = int(rng.integers(0, len(data) + 1))
+    return data[:at] + odd[int(rng.integers(len(odd)))] + data[at:]
+
+
+def odd_floats(data: bytes, rng: np.random.Generator) -> bytes:
+    """A number of the body becomes infinite, huge, tiny or none."""
+    values = np.array([np.nan, np.inf, -np.inf, 3e38, -1e30, 1e-40, 0.0, 1e20], ">f4" if rng.integers(2) else "<f4")
+    held = bytearray(data)
+    start = held.find(b"end_header")
+    for _ in range(int(rng.integers(1, 5))):
+        at = int(rng.integers(max(start, 0), max(len(held) - 4, start + 1, 1)))
+        held[at : at + 4] = values[int(rng.integers(len(values)))].tobytes()
+    return bytes(held)
+
+
+def header_token(data: bytes, rng: np.random.Generator) -> bytes:
+    """A word of the header becomes another, a number of it an odd one."""
+    head, mark, body = data.partition(b"end_header")
+    words = list(re.finditer(rb"[^\s]+", head))
+    if not words:
+        return data
+    word = words[int(rng.integers(len(words)))]
+    choices = NUMBERS if word[0].isdigit() and rng.integers(4) else WORDS
+    new = choices[int(rng.integers(len(choices)))].encode()
+    return head[: word.start()] + new + head[word.end() :] + mark + body
+
+
+def header_lines(data: bytes, rng: np.random.Generator) -> bytes:
+    """A line of the header goes, comes twice, or changes places with another."""
+    head, mark, body = data.partition(b"end_header")
+    lines = head.splitlines(keepends=True)
+    if len(lines) < 2:
+        return data
+    i, j = rng.integers(0, len(lines), 2).tolist()
+    how = int(rng.integers(4))
+    if how == 0:
+        del lines[i]
+    elif how == 1:
+        lines.insert(j, lines[i])
+    elif how == 2:
+        lines[i], lines[j] = lines[j], lines[i]
+    else:
+        lines[i] = lines[i] * int(rng.choice([2, 50, 5000]))
+    return b"".join(lines) + mark + body
+
+
+def text_token(data: bytes, rng: np.random.Generator) -> bytes:
+    """A word anywhere becomes an odd number."""
+    words = list(re.finditer(rb"[^\s,:\[\]{}]+", data))
+    if not words:
+        return data
+    word = words[int(rng.integers(len(words)))]
+    return data[: word.start()] + NUMBERS[int(rng.integers(len(NUMBERS)))].encode() + data[word.end() :]
+
+
+def json_value(data: bytes, rng: np.random.Generator) -> bytes:
+    """A value somewhere in a document becomes another, a key is renamed, or goes."""
+    try:
+        held = json.loads(data)
+    except (ValueError, RecursionError):
+        return data
+    places: list[tuple[dict | list, object]] = []
+    waiting = [held]
+    while waiting:
+        value = waiting.pop()
+        keys = list(value) if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()
+        places += [(value, key) for key in keys]
+        waiting += [value[key] for key in keys]
+    if not places:
+        return data
+    where, key = places[int(rng.integers(len(places)))]
+    how = int(rng.integers(5))
+    if how == 0 and isinstance(where, dict):
+        where[WORDS[int(rng.integers(len(WORDS)))]] = where.pop(key)
+    elif how == 1:
+        del where[key]
+    else:
+        where[key] = VALUES[int(rng.integers(len(VALUES)))]
+    return json.dumps(held).encode()
+
+
+BYTES: tuple[Mutation, ...] = (flip_bits, truncate, repeat_or_drop, odd_bytes)
+MUTATIONS: dict[str, tuple[Mutation, ...]] = {
+    "ply": (header_token, header_token, header_lines, text_token, odd_floats, odd_floats, *BYTES),
+    "recipe": (json_value, json_value, json_value, text_token, *BYTES),
+    "session": (json_value, json_value, json_value, text_token, *BYTES),
+    "npz": (flip_bits, *BYTES),
+    "cache": (flip_bits, *BYTES),
+}
+
+
+def mutations_of(kind: str, rng: np.random.Generator) -> list[tuple[Mutation, int]]:
+    """What is done to a file, each with the seed of its own generator; now and then nothing."""
+    pool = MUTATIONS[kind]
+    count = int(rng.choice([0, 1, 1, 1, 2, 3, 5]))
+    return [(pool[int(rng.integers(len(pool)))], int(rng.integers(2**32))) for _ in range(count)]
+
+
+def mutated(data: bytes, mutations: list[tuple[Mutation, int]]) -> bytes:
+    """Apply mutations one after another."""
+    for mutation, seed in mutations:
+        data = mutation(data, np.random.default_rng(seed))
+    return data

@@ -1,0 +1,69 @@
+"""A process that tries one input after another, each made from its number: ``python -m tests.campaign.worker SEED``."""
+
+import contextlib
+import os
+import sys
+import tempfile
+import traceback
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+from tests.campaign.checks import CHECKS
+from tests.campaign.mutations import mutated, mutations_of
+from tests.campaign.seeds import KINDS
+
+MEMORY_BYTES = 4 << 30
+SUFFIXES = {"ply": "ply", "recipe": "json", "session": "splap", "npz": "npz", "cache": "npz"}
+# Splat files have most to go wrong.
+SHARES = ("ply", "ply", "ply", "ply", "recipe", "session", "npz", "cache")
+
+
+def kind_of(number: int) -> str:
+    """What is tried under a number."""
+    return SHARES[number % len(SHARES)]
+
+
+def input_of(seed: int, number: int, left_out: tuple[int, ...] = ()) -> tuple[bytes, list[str]]:
+    """The input of a number and the mutations that made it; some may be left out, to find those that matter."""
+    rng = np.random.default_rng([seed, number])
+    kind = kind_of(number)
+    chosen = mutations_of(kind, rng)
+    kept = [mutation for i, mutation in enumerate(chosen) if i not in left_out]
+    data = KINDS[kind](int(rng.integers(2**31)))
+    return mutated(data, kept), [mutation.__name__ for mutation, _ in kept]
+
+
+def tried(folder: Path, seed: int, number: int, left_out: tuple[int, ...] = ()) -> str:
+    """``"accepted"``, ``"refused"``, or a traceback."""
+    kind = kind_of(number)
+    data, _ = input_of(seed, number, left_out)
+    path = folder / f"scene.{SUFFIXES[kind]}"
+    path.write_bytes(data)
+    try:
+        with warnings.catch_warnings():
+            # A warning would stand on standard error.
+            warnings.filterwarnings("error", module="splap_editor")
+            return "accepted" if CHECKS[kind](path, number) else "refused"
+    except Exception:
+        return traceback.format_exc()
+
+
+def main() -> None:
+    """Answer a line ``number,left out…`` with a line."""
+    with contextlib.suppress(ImportError):
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
+    os.environ.setdefault("SPLAP_CACHE_DIR", tempfile.gettempdir())
+    seed = int(sys.argv[1])
+    with tempfile.TemporaryDirectory() as folder:
+        print("ready", flush=True)
+        for line in sys.stdin:
+            number, *left_out = map(int, line.split(","))
+            print(repr(tried(Path(folder), seed, number, tuple(left_out))), flush=True)
+
+
+if __name__ == "__main__":
+    main()
