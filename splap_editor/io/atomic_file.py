@@ -46,7 +46,11 @@ def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     target = Path(os.path.realpath(path))
     mode = _mode_to_keep(target)
     _clear_abandoned(target.parent)
-    handle, temporary = _new_part(target)
+    try:
+        handle, temporary = _new_part(target)
+    except OSError as error:
+        error.filename = str(target)
+        raise
     try:
         with os.fdopen(handle, "wb") as file:
             yield file
@@ -55,9 +59,12 @@ def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
                 os.fchmod(file.fileno(), mode)
             os.fsync(file.fileno())
         os.replace(temporary, target)
-    except BaseException:
+    except BaseException as error:
         with contextlib.suppress(FileNotFoundError):
             os.unlink(temporary)
+        if isinstance(error, OSError) and error.errno is not None:
+            # A full disk names no file, and a rename names two.
+            error.filename, error.filename2 = str(target), None
         raise
     _sync_directory(target.parent)
 

@@ -205,7 +205,9 @@ def _write_blocks(
                     progress(min(written / max(n_bytes, 1), 1.0))
                     next_report += 0.05
     except FileNotFoundError:
-        raise PlyError(f"{path} cannot be written: the directory {path.parent} does not exist. Create it.") from None
+        # A link may lead into a directory that is gone.
+        folder = Path(os.path.realpath(path)).parent
+        raise PlyError(f"{path} cannot be written: the directory {folder} does not exist. Create it.") from None
     except OSError as error:
         raise PlyError(
             f"{path} cannot be written: {error.strerror or error}. Free some space or choose another place; "

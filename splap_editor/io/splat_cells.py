@@ -103,7 +103,9 @@ class SplatCells:
         rows = np.flatnonzero(_differs(before, after).any(axis=1))
         if len(rows) == 0:
             return
-        old, new = before[rows].astype(np.float64), after[rows].astype(np.float64)
+        # A signalling NaN complains when it is made wider.
+        with np.errstate(invalid="ignore"):
+            old, new = before[rows].astype(np.float64), after[rows].astype(np.float64)
         with np.errstate(divide="ignore", invalid="ignore"):
             lengths = np.linalg.norm(old, axis=1) / np.linalg.norm(new, axis=1)
         # A row without a usable rotation has no length to keep.

@@ -40,6 +40,17 @@ def test_an_exception_leaves_the_old_file_alone(error, tmp_path):
     assert os.listdir(tmp_path) == ["a"]
 
 
+def test_a_failure_names_the_file_that_was_to_be_written(tmp_path):
+    with pytest.raises(OSError, match="No space left") as full, atomic_file(tmp_path / "a") as file:
+        file.write(b"x")
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    (tmp_path / "link").symlink_to(tmp_path / "gone" / "a")
+    with pytest.raises(FileNotFoundError) as dangling, atomic_file(tmp_path / "link"):
+        pass
+    assert full.value.filename == str(tmp_path / "a")
+    assert dangling.value.filename == str(tmp_path / "gone" / "a")
+
+
 @pytest.mark.parametrize("call", ["fsync", "replace"])
 def test_a_failing_disk_leaves_the_old_file_alone(call, tmp_path, monkeypatch):
     target = tmp_path / "a"
