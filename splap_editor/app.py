@@ -6,14 +6,15 @@ import sys
 import traceback
 from collections.abc import Callable
 from pathlib import Path
-from time import sleep
 
 os.environ.setdefault("QT_API", "pyside6")
 
 from PySide6.QtCore import QCoreApplication, QObject, Qt, QTimer, Signal
 from PySide6.QtWidgets import QApplication
 
+from splap_editor.core.progress import no_progress
 from splap_editor.engine.cache import StageCache
+from splap_editor.first_start import FirstStart
 from splap_editor.installation.desktop_entry import APP_ID
 from splap_editor.session.autosave import Autosave
 from splap_editor.session.crash_report import CrashReport
@@ -33,9 +34,7 @@ from splap_editor.viewport.frame_pacer import FramePacer
 from splap_editor.viewport.inspect_view import InspectView
 from splap_editor.viewport.scene_view import SceneView
 from splap_editor.viewport.viewport import Viewport
-from splap_editor.warm_up import is_warm, load_view_loops, warm_up_elsewhere
-
-POLL_S = 0.1
+from splap_editor.warm_up import is_warm, load_view_loops
 
 
 class Mailbox(QObject):
@@ -56,8 +55,14 @@ class Mailbox(QObject):
         call()
 
 
-def run(path: Path | None = None) -> int:
+def run(path: Path | None = None, *, tell: Callable[[float], None] = no_progress) -> int:
     """Open the editor on a file, or on the bundled sample, and stay until it is closed.
+
+    Parameters
+    ----------
+    path : Path, optional
+    tell : callable
+        Given the share of the loops that is compiled, on the first start.
 
     Returns
     -------
@@ -87,7 +92,7 @@ def run(path: Path | None = None) -> int:
         app.quit()
 
     signals = EndSignals(end, window)
-    QTimer.singleShot(0, lambda: _open_first(window, path or sample_path()))
+    QTimer.singleShot(0, lambda: open_first(window, path or sample_path(), tell))
     code = app.exec()
     signals.close()
     crash_report.close()
@@ -123,40 +128,14 @@ def make_window(cache: StageCache | None = None) -> MainWindow:
     return window
 
 
-def _open_first(window: MainWindow, path: Path) -> None:
-    """Open the first file.
-
-    On the very first start the loops are compiled by other processes, since
-    it would freeze the window here: the file is shown as soon as what draws
-    it is there, and prepared when the rest is.
-    """
+def open_first(window: MainWindow, path: Path, tell: Callable[[float], None] = no_progress) -> FirstStart | None:
+    """Open the first file; gives what compiles the loops meanwhile, if that has not been done yet."""
     session = window.session
-    if is_warm():
-        window.files.open_path(path)
+    first = None if is_warm() else FirstStart(window, path.name, tell)
+    window.files.open_path(path)
+    if first is None:
         session.view_worker.submit(Job("load", "", lambda job: load_view_loops()))
-        return
-    processes = warm_up_elsewhere()
-
-    def wait_for(part: str) -> Callable[[Job], None]:
-        def wait(job: Job) -> None:
-            try:
-                while processes[part].poll() is None:
-                    job.report(0.0, "this takes half a minute, once")
-                    sleep(POLL_S)
-            finally:
-                if processes[part].poll() is None:
-                    processes[part].terminate()
-                    processes[part].wait()
-
-        return wait
-
-    def show(*_: object) -> None:
-        window.files.open_path(path)
-        # The worker takes this before it prepares the scene.
-        session.worker.submit(Job("warm", title, wait_for("engine")))
-
-    title = "Getting ready for this computer"
-    session.worker.submit(Job("warm", title, wait_for("view"), show, show, show))
+    return first
 
 
 def _shows_in(window: MainWindow):

@@ -11,7 +11,7 @@ import splap_editor
 from splap_editor.core.graph.options import EDGE_OPTIONS, GraphOptions
 from splap_editor.core.options import options_of
 from splap_editor.installation import commands as installation
-from splap_editor.stage_report import StageReport
+from splap_editor.stage_report import ShareLine, StageReport
 
 EXIT_OK, EXIT_REFUSED = 0, 2
 
@@ -142,7 +142,7 @@ def _edit(options: argparse.Namespace) -> int:
     from splap_editor.app import run
 
     check.finish()
-    return run(options.file)
+    return run(options.file, tell=ShareLine("compiling for this computer, once; the window works meanwhile"))
 
 
 def _render(options: argparse.Namespace) -> int:

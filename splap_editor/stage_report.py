@@ -64,3 +64,23 @@ class StageReport:
         """Print a line unless quiet."""
         if not self._quiet:
             print(text, file=sys.stderr)
+
+
+class ShareLine:
+    """One line for work that goes on beside something else: its share on a terminal, elsewhere only that it goes on."""
+
+    def __init__(self, text: str) -> None:
+        self._text = text
+        self._is_live = sys.stderr.isatty()
+        self._said: int | None = None
+
+    def __call__(self, share: float) -> None:
+        """Say how far the work is; the line ends with it."""
+        percent = int(100.0 * share)
+        if percent == self._said or (self._said is not None and not self._is_live):
+            return
+        self._said = percent
+        if self._is_live:
+            print(f"\r{self._text} {percent:3d} %", end="\n" if share >= 1.0 else "", file=sys.stderr, flush=True)
+        else:
+            print(self._text, file=sys.stderr, flush=True)

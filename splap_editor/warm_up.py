@@ -1,125 +1,230 @@
-"""Compiles every loop of the engine into the cache on disk, in a process of its own.
+"""Compiles every loop of the program into the cache on disk, in processes of their own, and says how far that is.
 
 Compiling holds Python's lock for half a minute in all; done here, the window of another process stays alive
 meanwhile. Two processes may do it at once: entries are written whole or not at all.
 """
 
+import contextlib
+import importlib
+import json
+import os
 import subprocess
 import sys
+import threading
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numba
-import numpy as np
+from numba import types
 
 import splap_editor
-from splap_editor.core.adaptation.kernel_adaptation import adapted_splats
-from splap_editor.core.deformers import method_titles
-from splap_editor.core.graph.options import GraphOptions
-from splap_editor.core.handle_nodes import Region
-from splap_editor.core.options import OptionSet
-from splap_editor.core.reach_options import ReachOptions
-from splap_editor.core.splats.spherical_harmonics import view_colors
-from splap_editor.core.splats.splats import Splats
-from splap_editor.engine.bound_edit import bind, ready_for_drags
+from splap_editor.core.adaptation.carried_ellipses import KernelArrays
+from splap_editor.core.adaptation.kernel_binding import RestArrays
+from splap_editor.core.twofold_loop import TwofoldLoop
 from splap_editor.engine.cache import default_cache_folder
-from splap_editor.engine.edit import Edit, Handle, Pose
-from splap_editor.engine.surface import surface_of
+from splap_editor.resources import resource
 
-PARTS = ("view", "engine")
-"""What is compiled side by side; the first is enough to show a scene."""
+MOST_PROCESSES = 4
 
 
-def is_warm(part: str = "engine") -> bool:
-    """Whether the loops of a part, for this state of the program, this Python and compiler, have been compiled."""
-    return _stamp(part).exists()
+@dataclass(frozen=True)
+class Loop:
+    """A compiled loop, as it is called.
+
+    Parameters
+    ----------
+    loop : str
+        Module and name within the package.
+    types : str
+        Of its arguments, in numba's notation.
+    seconds : float
+        Processor time that compiling it took where the table was made; of interest is its share of the whole.
+    group : int
+        Loops with the same number share inner loops, and are compiled by one process, in their order.
+    """
+
+    loop: str
+    types: str
+    seconds: float
+    group: int
+
+    def compile(self) -> None:
+        """Compile it for these types, or load it if that has been done."""
+        module_name, _, name = self.loop.rpartition(".")
+        module = importlib.import_module(f"splap_editor.{module_name}")
+        tuples = {named.__name__: _tuple_of(named) for named in (KernelArrays, RestArrays)}
+        # The table is the program's own.
+        arguments = eval(self.types, {"__builtins__": {}}, {**vars(types), **tuples})
+        getattr(module, name).compile(arguments)
 
 
-def warm_up(part: str) -> None:
-    """Compile the loops of a part, so that they are kept for every process to come."""
-    load_view_loops() if part == "view" else _warm_engine()
-    _stamp(part).parent.mkdir(parents=True, exist_ok=True)
-    _stamp(part).touch()
+def _tuple_of(named: type) -> Callable[..., types.Type]:
+    return lambda *fields: types.NamedTuple(fields, named)
 
 
-def _warm_engine() -> None:
-    """Run every stage on a sheet of splats."""
-    splats = _sheet()
-    surface = surface_of(splats, GraphOptions())
-    surface_of(splats, GraphOptions(rule="paper"))
-    ready_for_drags(surface)
-    center = surface.rest[0]
-    handles = (Handle(1, "", "#ffffff", Region(center, 0.1), Pose((0.0, 0.0, 0.3), (0.9, 0.1, 0.2, 0.3))),)
-    pins = (Region(surface.rest[-1], 0.1),)
-    for method in method_titles():
-        edit = Edit(handles, pins, method, OptionSet(ReachOptions(None)))
-        bound = bind(surface, edit)
-        bound.drag(edit)
-        kernels = bound.pose().kernels
-        # A drag that goes on from a settled pose takes another path.
-        bound.drag(edit)
-    adapted_splats(splats, kernels)
+@cache
+def loops() -> tuple[Loop, ...]:
+    """Read the table of loops, made by ``tests/benchmark/loops.py``."""
+    return tuple(Loop(**row) for row in json.loads(resource("loops.json").read_text(encoding="utf-8")))
+
+
+def is_warm() -> bool:
+    """Whether the loops, for this state of the program, this Python and compiler, have been compiled."""
+    return _stamp().exists()
 
 
 def load_view_loops() -> None:
-    """Load what picks, sorts and colours from the cache, or compile it, so that its first use is quick."""
-    splats = _sheet(4)
-    _view(splats, splats.means)
-    n = len(splats.means)
-    view_colors(splats.sh0, splats.shN, np.zeros((n, 3)), np.broadcast_to(np.eye(3), (n, 3, 3)), np.zeros(3))
+    """Load what picks, sorts and colours from the cache, and use it from here on."""
+    for loop in loops():
+        if loop.loop.startswith(("viewport.", "core.splats.")):
+            loop.compile()
+    TwofoldLoop.use_compiled(True)
 
 
-def warm_up_elsewhere() -> dict[str, subprocess.Popen]:
-    """Start `warm_up` of each part in a process of its own; an exit code of 0 says that it is compiled."""
-    command = [sys.executable, "-m", "splap_editor.warm_up"]
-    return {part: subprocess.Popen([*command, part], stdin=subprocess.DEVNULL) for part in PARTS}
+class Compilation:
+    """Compiles loops in other processes.
+
+    A thread stands before each process: it hands it a loop and waits. What
+    cannot be compiled there is left for the process that will call it.
+
+    Parameters
+    ----------
+    told : callable
+        Called from any thread whenever a loop is done.
+    wanted : sequence of Loop, optional
+        All by default.
+    command : sequence of str, optional
+        What to run; it reads numbers of loops and answers each with a line.
+    """
+
+    def __init__(
+        self,
+        told: Callable[[], None],
+        wanted: Sequence[Loop] | None = None,
+        command: Sequence[str] = (sys.executable, "-m", "splap_editor.warm_up"),
+    ) -> None:
+        self._told = told
+        self._wanted = tuple(loops() if wanted is None else wanted)
+        self._command = tuple(command)
+        # The longest first, so that no process is left alone with it at the end.
+        self._queue = deque(sorted(_grouped(self._wanted), key=_seconds, reverse=True))
+        self._n_left = len(self._wanted)
+        self._left_s = _seconds(self._wanted)
+        self._failed = False
+        self._lock = threading.Lock()
+        self._processes: list[subprocess.Popen] = []
+        self._threads: list[threading.Thread] = []
+
+    def start(self, n_processes: int | None = None) -> None:
+        """Start processes, or more of them; None: as many as there are cores."""
+        n_wanted = min(n_processes or os.cpu_count() or 1, MOST_PROCESSES)
+        for _ in range(n_wanted - len(self._processes)):
+            pipe = subprocess.PIPE
+            process = subprocess.Popen(self._command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, text=True)
+            thread = threading.Thread(target=self._serve, args=(process,), name="splap-compile", daemon=True)
+            self._processes.append(process)
+            self._threads.append(thread)
+            thread.start()
+
+    @property
+    def share(self) -> float:
+        """How much of the work is done, 0 to 1: each loop counts as much as it costs."""
+        return 1.0 - self._left_s / max(_seconds(self._wanted), 1e-9) if self._n_left else 1.0
+
+    @property
+    def n_done(self) -> int:
+        """How many loops are compiled."""
+        return len(self._wanted) - self._n_left
+
+    @property
+    def n_loops(self) -> int:
+        """How many there are."""
+        return len(self._wanted)
+
+    @property
+    def is_done(self) -> bool:
+        """Whether nothing is left to do."""
+        return self._n_left == 0
+
+    def keep(self) -> None:
+        """Note for later starts that everything is compiled, unless something could not be."""
+        if self.is_done and not self._failed:
+            _stamp().parent.mkdir(parents=True, exist_ok=True)
+            _stamp().touch()
+
+    def close(self) -> None:
+        """End the processes, whatever they are doing."""
+        with self._lock:
+            self._queue.clear()
+        for process in self._processes:
+            process.terminate()
+        for thread in self._threads:
+            thread.join()
+
+    def _serve(self, process: subprocess.Popen) -> None:
+        try:
+            while True:
+                with self._lock:
+                    if not self._queue:
+                        return
+                    group = self._queue.popleft()
+                for loop in group:
+                    answer = _answer(process, self._wanted.index(loop))
+                    with self._lock:
+                        self._failed |= answer != "done"
+                        self._n_left -= 1
+                        self._left_s -= loop.seconds
+                    self._told()
+        finally:
+            # One that has ended leaves words in the pipe that nobody will read.
+            with contextlib.suppress(OSError):
+                process.stdin.close()
+            process.stdout.close()
+            process.wait()
 
 
-def _stamp(part: str) -> Path:
+def _answer(process: subprocess.Popen, index: int) -> str:
+    """What a process says to a loop; nothing if it has ended."""
+    try:
+        process.stdin.write(f"{index}\n")
+        process.stdin.flush()
+        return process.stdout.readline().strip()
+    except (OSError, ValueError):
+        return ""
+
+
+def _grouped(wanted: Iterable[Loop]) -> list[list[Loop]]:
+    groups: dict[int, list[Loop]] = {}
+    for loop in wanted:
+        groups.setdefault(loop.group, []).append(loop)
+    return list(groups.values())
+
+
+def _seconds(some: Iterable[Loop]) -> float:
+    return sum(loop.seconds for loop in some)
+
+
+def _stamp() -> Path:
     """An empty file named after everything that the compiled loops depend on."""
     python = f"py{sys.version_info.major}.{sys.version_info.minor}"
     newest = max(int(path.stat().st_mtime) for path in Path(splap_editor.__file__).parent.rglob("*.py"))
-    return default_cache_folder() / f"compiled-{part}-{splap_editor.__version__}-{newest}-{python}-{numba.__version__}"
+    return default_cache_folder() / f"compiled-{splap_editor.__version__}-{newest}-{python}-{numba.__version__}"
 
 
-def _sheet(n: int = 80) -> Splats:
-    """A wavy sheet of n² overlapping splats, large enough for the coarse model of a drag."""
-    x, y = (axis.ravel() for axis in np.meshgrid(np.linspace(-1, 1, n), np.linspace(-1, 1, n)))
-    rng = np.random.default_rng(0)
-    x, y = x + rng.normal(0, 0.1 / n, n * n), y + rng.normal(0, 0.1 / n, n * n)
-    return Splats(
-        means=np.stack([x, y, 0.1 * np.sin(3 * x)], 1).astype(np.float32),
-        log_scales=np.full((n * n, 2), np.log(1.0 / n), np.float32),
-        quats=np.tile(np.array([1.0, 0.0, 0.0, 0.0], np.float32), (n * n, 1)),
-        logit_opacities=np.full(n * n, 3.0, np.float32),
-        sh0=np.zeros((n * n, 3), np.float32),
-        shN=np.zeros((n * n, 15, 3), np.float32),
-    )
-
-
-def _view(splats: Splats, means: np.ndarray) -> None:
-    """Compile what picks and sorts."""
-    import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - registers the OpenGL implementations
-
-    from splap_editor.viewport.depth_order import depth_order
-    from splap_editor.viewport.glyphs import base_colors, splat_glyphs
-    from splap_editor.viewport.picking import surface_hit
-    from splap_editor.viewport.projection import Projection
-    from splap_editor.viewport.regions import in_brush, in_lasso, in_rectangle, screen_points, visible_only
-    from splap_editor.viewport.splat_actor import SplatActor
-
-    depth_order(means, np.array([0.0, 0.0, -1.0], np.float32))
-    actor = SplatActor(splat_glyphs(splats), base_colors(splats))
-    view = np.eye(4)
-    view[2, 3] = -3.0
-    projection = Projection(view, np.diag([1.0, 1.0, -1.0, 1.0]), 64, 64)
-    surface_hit(actor, projection, 32.0, 32.0)
-    screen = screen_points(actor, projection)
-    square = [(8.0, 8.0), (56.0, 8.0), (56.0, 56.0), (8.0, 56.0)]
-    in_rectangle(screen, 8.0, 8.0, 56.0, 56.0)
-    in_brush(screen, square, 4.0)
-    visible_only(actor, projection, screen, in_lasso(screen, square))
+def _obey(lines: Iterable[str], say: Callable[[str], Any]) -> None:
+    """Compile the loops that are asked for by their numbers, one a line."""
+    for line in lines:
+        try:
+            loops()[int(line)].compile()
+        except Exception as error:  # whatever it is, the program compiles the loop where it is called
+            say(f"failed: {error}".replace("\n", " "))
+        else:
+            say("done")
 
 
 if __name__ == "__main__":
-    for name in sys.argv[1:] or PARTS:
-        warm_up(name)
+    _obey(sys.stdin, lambda text: print(text, flush=True))

@@ -32,6 +32,7 @@ _KIND_OF = {
     "test_contributing.py": "pure",
     "test_kinds.py": "pure",
     "test_readme.py": "pure",
+    "test_warm_up.py": "offscreen",
     "test_packaging.py": "pure",
     "test_resources.py": "pure",
     "tools": "offscreen",

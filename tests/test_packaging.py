@@ -25,7 +25,7 @@ def test_the_wheel_carries_the_resources_where_the_program_looks_for_them():
     wheel = PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]
     assert wheel["packages"] == ["splap_editor"]
     # The pictures of the README stay out of the wheel.
-    names = ("icons", "samples", "schemas", "shaders", "system-packages.txt")
+    names = ("icons", "loops.json", "samples", "schemas", "shaders", "system-packages.txt")
     assert wheel["force-include"] == {f"resources/{name}": f"splap_editor/_resources/{name}" for name in names}
 
 

@@ -55,6 +55,7 @@ class Session:
         self.worker.on_progress = lambda job: self.job_changed.emit(job)
         self.worker.on_busy = self._on_busy
         self._told_job: Job | None = None
+        self._elsewhere: Job | None = None
         self._ledger = Ledger(cache)
         self._runner = StageRunner(self._ledger, self.worker)
         self._frames = self._runner.loop("drag")
@@ -80,7 +81,7 @@ class Session:
 
     @property
     def state(self) -> str:
-        """One of empty, preparing, ready, binding, dragging, settling, settled, halted and failed."""
+        """One of empty, opening, preparing, ready, binding, dragging, settling, settled, halted and failed."""
         return self._ledger.state
 
     @property
@@ -221,11 +222,26 @@ class Session:
         self._ledger.given_up = None
         self._runner.advance()
 
+    def hold(self) -> None:
+        """Open files and take edits, but make nothing of them until `release`."""
+        self._ledger.is_held = True
+
+    def release(self) -> None:
+        """Make what is missing."""
+        self._ledger.is_held = False
+        self._runner.advance()
+
+    def tell(self, job: Job | None) -> None:
+        """Show work that is done elsewhere whenever the worker has none to show; None: it is over."""
+        self._elsewhere = job
+        if self._told_job is None and self.state != "halted":
+            self.job_changed.emit(job)
+
     def _on_busy(self, job: Job | None) -> None:
         """Tell which job runs; frames of a drag, which have no title, come and go too fast to be told."""
         if job is not self._told_job and (job is None or job.title):
             self._told_job = job
-            self.job_changed.emit(job)
+            self.job_changed.emit(job or self._elsewhere)
 
     def _on_made(self, stage: str, value: Any) -> None:
         if stage == "open":

@@ -48,6 +48,8 @@ class StageRunner:
                 stage.take(ledger, None, None)
                 continue
             self._set_state(stage.state(ledger))
+            if ledger.is_held and stage.name != "open":
+                return
             if any(self._loops[name].is_busy for name in stage.awaits):
                 return
             request = stage.request(ledger)
@@ -98,7 +100,9 @@ class StageRunner:
     def _fail(self, stage: Stage, request: Any, error: Exception) -> None:
         ledger = self._ledger
         stage.fail(ledger, request)
-        if ledger.scene is not None and ledger.scene.shown_edit is ledger.given_up:
+        if ledger.scene is None:
+            self._set_state("empty")
+        elif ledger.scene.shown_edit is ledger.given_up:
             self._set_state("failed")
         self.failed.emit(stage.title(request), error)
 

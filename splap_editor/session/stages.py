@@ -60,6 +60,8 @@ class Ledger:
         An edit that failed; it is left until another is asked for.
     is_halted : bool
         Nothing more is made for the scene until the person says so.
+    is_held : bool
+        Files are opened and edits taken, but nothing is made of them yet: it would run loops that are being compiled.
     """
 
     cache: StageCache | None = None
@@ -73,6 +75,7 @@ class Ledger:
     exported: Edit | None = None
     given_up: Edit | None = None
     is_halted: bool = False
+    is_held: bool = False
     state: str = "empty"
 
     @property
@@ -250,7 +253,7 @@ STAGES = (
         "open",
         needs=lambda ledger: ledger.opening is not None,
         is_current=lambda ledger: False,
-        state=lambda ledger: ledger.state,
+        state=lambda ledger: "opening" if ledger.scene is None else ledger.state,
         cancels=("prepare", "bind", "pose", "drag"),
         request=lambda ledger: ledger.opening,
         make=opened_scene,

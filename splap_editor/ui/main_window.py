@@ -1,6 +1,6 @@
 """The window: viewport in the middle, tools at the left, panels at the right, one line of state below."""
 
-from PySide6.QtCore import QEvent, QPoint, QSettings, QSize, Qt
+from PySide6.QtCore import QEvent, QPoint, QSettings, QSize, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QKeyEvent
 from PySide6.QtWidgets import (
     QDockWidget,
@@ -91,6 +91,9 @@ class MainWindow(FileDrop, QMainWindow):
     display : Display
     """
 
+    closing = Signal()
+    """Nothing keeps the window open any more: what goes on for it elsewhere ends."""
+
     def __init__(
         self,
         session: Session,
@@ -157,7 +160,7 @@ class MainWindow(FileDrop, QMainWindow):
             edit_changed=self._on_edit_changed,
         )
         session.history.changed.connect(self._refresh)
-        session.state_changed.connect(self._refresh)
+        session.state_changed.connect(self._on_state_changed)
         session.exported.connect(lambda report: self._refresh())
         documents.changed.connect(self._refresh)
         self.inspection.changed.connect(self._refresh)
@@ -298,6 +301,11 @@ class MainWindow(FileDrop, QMainWindow):
         self.overlay.show_hint(*(() if self._has_hinted else HINT))
         self._refresh()
 
+    def _on_state_changed(self) -> None:
+        if self.session.state == "opening":
+            self.overlay.show_hint("Opening the file …")
+        self._refresh()
+
     def _on_failed(self, title: str, error: Exception) -> None:
         if self.session.scene is None:
             self.overlay.show_hint("Drop a splat PLY here, or press Ctrl+O.")
@@ -361,6 +369,7 @@ class MainWindow(FileDrop, QMainWindow):
         self.display.save()
         self.timeline_actions.player.stop()
         self.tools.cancel()
+        self.closing.emit()
         self.recovery_bar.release()
         self.autosave.close(keep=self._keeps_edit)
         self.documents.close()

@@ -124,16 +124,19 @@ def _near_path_plain(screen, path, radius, inside):
 
 @nb.njit(nogil=True, cache=True)
 def _near_path_compiled(screen, path, radius, inside):
-    low_x, high_x = path[:, 0].min() - radius, path[:, 0].max() + radius
-    low_y, high_y = path[:, 1].min() - radius, path[:, 1].max() + radius
+    low_x = low_y = np.inf
+    high_x = high_y = -np.inf
+    for k in range(path.shape[0]):
+        low_x, high_x = min(low_x, path[k, 0] - radius), max(high_x, path[k, 0] + radius)
+        low_y, high_y = min(low_y, path[k, 1] - radius), max(high_y, path[k, 1] + radius)
     for i in range(screen.shape[0]):
         x, y = screen[i, 0], screen[i, 1]
         inside[i] = False
         if not (low_x <= x <= high_x and low_y <= y <= high_y):
             continue
         for k in range(path.shape[0]):
-            ax, ay = path[max(k - 1, 0)]
-            bx, by = path[k]
+            before = max(k - 1, 0)
+            ax, ay, bx, by = path[before, 0], path[before, 1], path[k, 0], path[k, 1]
             ex, ey = bx - ax, by - ay
             length = ex * ex + ey * ey
             t = min(max(((x - ax) * ex + (y - ay) * ey) / length, 0.0), 1.0) if length > 0.0 else 0.0
@@ -204,9 +207,9 @@ def _depth_grid_compiled(
     right, bottom = left + columns * _CELL_PX, top + rows * _CELL_PX
     is_perspective = clip[3, 0] != 0.0 or clip[3, 1] != 0.0 or clip[3, 2] != 0.0
     # Largest pixels per world unit at unit depth, to pass over what is far from the region.
-    zoom = max(half_x * np.sqrt((clip[0, :3] ** 2).sum()), -half_y * np.sqrt((clip[1, :3] ** 2).sum())) * np.float32(
-        2.0
-    )
+    zoom_x = half_x * np.sqrt(clip[0, 0] * clip[0, 0] + clip[0, 1] * clip[0, 1] + clip[0, 2] * clip[0, 2])
+    zoom_y = -half_y * np.sqrt(clip[1, 0] * clip[1, 0] + clip[1, 1] * clip[1, 1] + clip[1, 2] * clip[1, 2])
+    zoom = np.float32(2.0) * max(zoom_x, zoom_y)
     for i in range(screen.shape[0]):
         reach = min(shape[i, 1] * scale, solid_radius)
         depth, px, py = screen[i, 2], screen[i, 0], screen[i, 1]

@@ -67,7 +67,7 @@ def test_opening_prepares_in_the_background(main, session):
     session.state_changed.connect(lambda: states.append(session.state))
     session.open(TUBE)
     main.run_until(lambda: session.state == "ready")
-    assert states == ["preparing", "ready"]
+    assert states == ["opening", "preparing", "ready"]
     assert session.scene.surface.graph.n_edges > 0 and session.failures == []
 
 

@@ -21,7 +21,9 @@ def heap_add(keys, items, size, key, item):
 def twice_as_long(values):
     """Copy of an array with as much room again."""
     longer = np.empty(2 * len(values), values.dtype)
-    longer[: len(values)] = values
+    # Assigning to a slice would have numba compile the words of its complaint about shapes, once for each type.
+    for i in range(len(values)):
+        longer[i] = values[i]
     return longer
 
 

@@ -100,6 +100,7 @@ class DeformerPanel(QWidget):
         share = f": {100 * residual:.2g} % of the size to go" if np.isfinite(residual) and residual > 0 else ""
         return {
             "empty": ("Nothing is open.", "quiet"),
+            "opening": ("Opening the file.", "quiet"),
             "preparing": ("Preparing the surface; handles can be placed meanwhile.", ""),
             "ready": ("At rest: no handle is placed.", "quiet"),
             "binding": ("Getting ready to bend.", ""),

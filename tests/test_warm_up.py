@@ -1,0 +1,80 @@
+"""The table of loops is that of the program, and its compilation says truly how far it is."""
+
+import sys
+import threading
+
+import pytest
+from numba.core.registry import CPUDispatcher
+
+from splap_editor.warm_up import Compilation, Loop, is_warm, loops
+from tests.benchmark.loops import loop_name, notation, reached
+from tests.every_loop import call_every_loop
+
+ANSWERS = "import sys\nfor line in sys.stdin: print({!r}, flush=True)"
+
+
+def made(*seconds: float) -> list[Loop]:
+    return [Loop(f"loop{i}", "()", cost, i // 2) for i, cost in enumerate(seconds)]
+
+
+def compilation(wanted, answer="done") -> tuple[Compilation, list[float]]:
+    shares: list[float] = []
+    told = threading.Event()
+
+    def tell() -> None:
+        shares.append(work.share)
+        if work.is_done:
+            told.set()
+
+    work = Compilation(tell, wanted, (sys.executable, "-c", ANSWERS.format(answer)))
+    assert work.share == 0.0 and not work.is_done
+    work.start(1)
+    work.start(2)
+    assert told.wait(60)
+    work.close()
+    return work, shares
+
+
+def test_the_share_rises_by_what_each_loop_costs():
+    work, shares = compilation(made(1.0, 1.0, 6.0, 2.0))
+    assert shares == sorted(shares) and shares[-1] == 1.0
+    assert {round(share, 3) for share in shares} <= {0.1, 0.2, 0.6, 0.7, 0.8, 0.9, 1.0}
+    assert work.n_done == work.n_loops == 4
+
+
+@pytest.mark.parametrize(("answer", "kept"), [("done", True), ("failed: no such type", False)])
+def test_only_a_whole_compilation_is_kept(answer, kept):
+    work, _ = compilation(made(1.0, 2.0), answer)
+    assert not is_warm()
+    work.keep()
+    assert is_warm() is kept
+
+
+def test_a_process_that_ends_is_not_waited_for():
+    work = Compilation(lambda: None, made(1.0, 2.0), (sys.executable, "-c", "pass"))
+    work.start(1)
+    work._threads[0].join(60)
+    assert work.is_done
+    work.keep()
+    assert not is_warm()
+
+
+def test_the_table_holds_every_loop_that_is_called_from_python():
+    call_every_loop()
+    modules = [module for name, module in list(sys.modules.items()) if name.startswith("splap_editor.")]
+    there = {loop for module in modules for loop in vars(module).values() if isinstance(loop, CPUDispatcher)}
+    # A loop that only loops call is compiled into these.
+    inner = {called for loop in there for called in reached(loop) if called is not loop}
+    called = {loop_name(loop) for loop in there - inner if loop.signatures}
+    assert called <= {row.loop for row in loops()}
+
+
+def test_every_row_of_the_table_is_loaded_as_it_is_called():
+    call_every_loop()
+    for row in loops():
+        module, _, name = row.loop.rpartition(".")
+        loop = getattr(sys.modules[f"splap_editor.{module}"], name)
+        before = list(loop.signatures)
+        row.compile()
+        assert list(loop.signatures) == before, f"{row.loop} is called with other types"
+        assert row.types in [notation(kinds) for kinds in before]
