@@ -113,7 +113,7 @@ def _add_frames(parser: argparse.ArgumentParser, text: str) -> None:
 def _add_options(parser: argparse.ArgumentParser, group: type, names: Sequence[str]) -> None:
     """Flags for some options of a group; lists of rows are for recipes."""
     for name, known in options_of(group).items():
-        if name in names and known.kind != "pairs":
+        if name in names and known.kind not in ("pairs", "strokes"):
             parser.add_argument(
                 f"--{name.replace('_', '-')}",
                 type=type(known.default),

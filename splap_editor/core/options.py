@@ -91,6 +91,8 @@ class Option:
         Name and values of another option of the group without which this one means nothing.
     is_always_written : bool
         A recipe says it even where it is at its default.
+    strokes : type, optional
+        Class of each item of a list of strokes: parts ``a`` and ``b``, and options of its own.
     default : object
         Filled in by `options_of`.
     """
@@ -107,13 +109,16 @@ class Option:
     decimals: int = 3
     only_for: tuple[str, tuple[str, ...]] | None = None
     is_always_written: bool = False
+    strokes: type | None = None
     default: Any = None
 
     @property
     def kind(self) -> str:
-        """``"choice"``, ``"flag"``, ``"integer"``, ``"number"``, ``"length"`` or ``"pairs"``."""
+        """``"choice"``, ``"flag"``, ``"integer"``, ``"number"``, ``"length"``, ``"pairs"`` or ``"strokes"``."""
         if self.choices:
             return "choice"
+        if self.strokes is not None:
+            return "strokes"
         kinds = ((bool, "flag"), (int, "integer"), (float, "number"), (ShareOfSize, "length"), (tuple, "pairs"))
         return next(kind for held, kind in kinds if isinstance(self.default, held))
 
@@ -126,6 +131,8 @@ class Option:
             return "true or false"
         if self.kind == "pairs":
             return "a list of [row, row] pairs"
+        if self.kind == "strokes":
+            return "a list of strokes over two parts"
         if self.kind == "integer":
             return f"a whole number, {self.least:g} " + (f"to {self.most:g}" if self.most < math.inf else "or more")
         low = f" greater than {self.above:g}" if self.above > -math.inf else ""
@@ -140,6 +147,8 @@ class Option:
             return isinstance(value, bool)
         if self.kind == "pairs":
             return isinstance(value, tuple | list)
+        if self.strokes is not None:
+            return isinstance(value, tuple | list) and all(isinstance(item, self.strokes) for item in value)
         if self.kind == "length" and (value is None or isinstance(value, ShareOfSize)):
             return value is None or self.accepts(value.share)
         if isinstance(value, bool) or not isinstance(value, Integral if self.kind == "integer" else Real):

@@ -18,6 +18,7 @@ from splap_editor.core.splats.occupancy import Ellipses
 from splap_editor.core.surface.geodesics import Neighborhoods
 from splap_editor.core.surface.laplacian import point_cloud_laplacian
 from splap_editor.core.surface.local_triangulation import local_triangulations, mended_triangulations
+from splap_editor.engine.strokes import stroke_mends
 
 
 class Timed(Protocol):
@@ -42,6 +43,8 @@ class SurfaceStages(NamedTuple):
     triangles : (T, 3) int32
     L : (n, n) csr_array
     M : (n,) float64
+    mends : GraphOptions
+        The options with each stroke as the edges that it cut or added.
     """
 
     options: GraphOptions
@@ -51,11 +54,12 @@ class SurfaceStages(NamedTuple):
     triangles: NDArray[np.int32]
     L: sp.csr_array
     M: NDArray[np.float64]
+    mends: GraphOptions
 
 
 def unmended(options: GraphOptions) -> GraphOptions:
-    """Leave out the cut and added edges."""
-    return replace(options, cut=(), add=())
+    """Leave out the cut and added edges, and strokes."""
+    return replace(options, cut=(), add=(), separate=(), join=())
 
 
 Guard = Callable[[Progress], AbstractContextManager]
@@ -80,7 +84,7 @@ def plain_stages(
     with timed("laplacian"):
         triangles = local_triangulations(ellipses, neighborhoods, progress=stages("laplacian"))
         L, M = point_cloud_laplacian(ellipses.centers, triangles, graph=graph, method=options.laplacian)
-    return SurfaceStages(options, graph, graph, neighborhoods, triangles, L, M)
+    return SurfaceStages(options, graph, graph, neighborhoods, triangles, L, M, options)
 
 
 def mended_stages(
@@ -91,16 +95,17 @@ def mended_stages(
     stages: StageProgress,
     alone: Guard = unguarded,
 ) -> SurfaceStages:
-    """Go on from stages that differ in cut and added edges only: to the bit what all stages would give.
+    """Go on from stages that differ in cut and added edges and strokes only: to the bit what all stages would give.
 
     The graph is not searched again, geodesics and stars only where a changed edge reaches.
     """
     with timed("mends"):
         progress = stages("mends")
-        is_plain = not options.cut and not options.add
-        graph = before.unmended if is_plain else mended_graph(ellipses, before.unmended, options)
+        mends = stroke_mends(ellipses, before.unmended, options, near=(before.options, before.mends))
+        is_plain = not mends.cut and not mends.add
+        graph = before.unmended if is_plain else mended_graph(ellipses, before.unmended, mends)
         progress(0.2)
-        ends = _changed_ends(ellipses, before.options, options)
+        ends = _changed_ends(ellipses, before.mends, mends)
         with alone(progress):
             row = NEIGHBORHOODS[options.neighborhood]
             if row.mended:
@@ -112,7 +117,7 @@ def mended_stages(
         progress(0.5)
     with timed("laplacian"):
         L, M = point_cloud_laplacian(ellipses.centers, triangles, graph=graph, method=options.laplacian)
-    return SurfaceStages(options, before.unmended, graph, neighborhoods, triangles, L, M)
+    return SurfaceStages(options, before.unmended, graph, neighborhoods, triangles, L, M, mends)
 
 
 def _changed_ends(ellipses: Ellipses, before: GraphOptions, after: GraphOptions) -> NDArray[np.int64]:
@@ -170,4 +175,5 @@ def unpacked_stages(kept: Arrays, options: GraphOptions, n_nodes: int) -> Surfac
     )
     neighborhoods = Neighborhoods(kept["near_indptr"], kept["near_indices"], kept["near_distances"])
     L = sp.csr_array((kept["L_data"], kept["L_indices"], kept["L_indptr"]), shape=(n_nodes, n_nodes))
-    return SurfaceStages(unmended(options), graph, graph, neighborhoods, kept["triangles"], L, kept["M"])
+    options = unmended(options)
+    return SurfaceStages(options, graph, graph, neighborhoods, kept["triangles"], L, kept["M"], options)

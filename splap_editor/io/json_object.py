@@ -7,6 +7,7 @@ from difflib import get_close_matches
 from typing import Any, Literal, TypeVar, overload
 
 from splap_editor.core.options import Option, options_of
+from splap_editor.core.pose import LARGEST_COORDINATE
 
 Error = Callable[[str], ValueError]
 Group = TypeVar("Group")
@@ -135,10 +136,41 @@ class JsonObject:
     def _option(self, key: str, known: Option) -> Any:
         if known.kind == "pairs":
             return self.row_pairs(key)
+        if known.strokes is not None:
+            return self.strokes(key, known.strokes)
         value = self._value[key]
         if not known.accepts(value):
             raise self.refuse(key, known.wanted)
         return float(value) if known.kind in ("number", "length") and value is not None else value
+
+    def strokes(self, key: str, kind: type[Group]) -> tuple[Group, ...]:
+        """A list, perhaps empty, of strokes over two parts ``a`` and ``b``, with options of their own."""
+        own = options_of(kind)
+        found = []
+        for item in self.objects(key, ("a", "b", *own)):
+            for name, known in own.items():
+                if name not in item and not known.accepts(known.default):
+                    raise item.refuse(name, known.wanted)
+            said = {name: item._option(name, known) for name, known in own.items() if name in item}
+            found.append(kind(a=item.points("a"), b=item.points("b"), **said))
+        return tuple(found)
+
+    def points(self, key: str) -> tuple[tuple[float, float, float], ...]:
+        """A list of points with at least one in it, which must be there."""
+        value = self._value.get(key)
+        if not isinstance(value, list | tuple) or not value:
+            raise self.refuse(key, "a list of [x, y, z] points with at least one in it")
+        found = []
+        for i, point in enumerate(value):
+            numbers = [_finite(part) for part in point] if isinstance(point, list | tuple) and len(point) == 3 else []
+            fine = [number for number in numbers if number is not None and abs(number) <= LARGEST_COORDINATE]
+            if len(fine) != 3:
+                raise self._error(
+                    f"{self.at(key)}[{i}] must be a point of 3 finite numbers between {-LARGEST_COORDINATE:g} and "
+                    f"{LARGEST_COORDINATE:g}, got {shown(point)}"
+                )
+            found.append((fine[0], fine[1], fine[2]))
+        return tuple(found)
 
     def rows(self, key: str) -> tuple[int, ...]:
         """A list of file rows with at least one in it."""

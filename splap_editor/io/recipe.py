@@ -9,7 +9,7 @@ import numpy as np
 
 from splap_editor.core.adaptation.options import AdaptationOptions
 from splap_editor.core.deformers import DEFORMERS, method_titles
-from splap_editor.core.graph.options import GraphOptions
+from splap_editor.core.graph.options import GraphOptions, Joint, Separation
 from splap_editor.core.options import OptionSet, ShareOfSize, options_of
 from splap_editor.core.pose import LARGEST_COORDINATE, SCALES, Pose
 from splap_editor.core.reach_options import CageOptions, ReachOptions
@@ -237,6 +237,8 @@ def _plain(value: Any) -> Any:
     """Value with lists for tuples and Python's numbers for numpy's."""
     if isinstance(value, ShareOfSize):
         raise RecipeError(f"a length of {value.share:g} times the size cannot be written: give it in the file's units")
+    if isinstance(value, Separation | Joint):
+        return {"a": _plain(value.a), "b": _plain(value.b), **_said(value)}
     if isinstance(value, tuple | list | np.ndarray):
         return [_plain(item) for item in value]
     return value.item() if isinstance(value, np.generic) else value

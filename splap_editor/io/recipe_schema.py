@@ -85,6 +85,12 @@ def _option(known: Option) -> dict[str, Any]:
         said |= {"enum": list(known.choices), "default": known.default}
     elif known.kind == "flag":
         said |= {"type": "boolean", "default": known.default}
+    elif known.strokes is not None:
+        own = options_of(known.strokes)
+        parts = {"type": "array", "items": _vector(3, _POINT), "minItems": 1}
+        needed = ["a", "b", *(name for name, each in own.items() if not each.accepts(each.default))]
+        stroke = _object({"a": parts, "b": parts, **{name: _option(each) for name, each in own.items()}}, needed)
+        said |= {"type": "array", "items": stroke, "default": []}
     elif known.kind == "pairs":
         said |= {"type": "array", "items": _PAIR, "default": []}
     else:
@@ -93,7 +99,7 @@ def _option(known: Option) -> dict[str, Any]:
         said |= {name: bound for name, bound in bounds if math.isfinite(bound)}
         if isinstance(known.default, ShareOfSize):
             said["description"] += f" By default {known.default.share:g} times the size of the scene."
-        else:
+        elif known.accepts(known.default):
             said["default"] = known.default
     return said
 

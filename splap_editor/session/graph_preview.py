@@ -1,7 +1,9 @@
 """The graph as it would be with other options, made in the background."""
 
 from splap_editor.core.graph.options import GraphOptions, edges_only
-from splap_editor.core.graph.splat_graph import SplatGraph, splat_graph
+from splap_editor.core.graph.splat_graph import SplatGraph, mended_graph, splat_graph
+from splap_editor.engine.strokes import stroke_mends
+from splap_editor.engine.surface_stages import unmended
 from splap_editor.session.jobs import REPORT_SECONDS, Job
 from splap_editor.session.latest_job import LatestJob
 from splap_editor.session.scene_follower import SceneFollower
@@ -58,7 +60,9 @@ class GraphPreview:
                     job.deliver(lambda: deliver(options, share))
 
             with alone(job.report):
-                return splat_graph(ellipses, options, progress=progress)
+                plain = splat_graph(ellipses, unmended(options), progress=progress)
+                mends = stroke_mends(ellipses, plain, options)
+                return mended_graph(ellipses, plain, mends) if mends.cut or mends.add else plain
 
         self._job.ask(make, lambda graph: self._take(options, graph))
         self.changed.emit()

@@ -85,7 +85,7 @@ def test_every_option_says_what_it_does_and_has_a_default_that_it_accepts():
     for group in (GraphOptions, ReachOptions, CageOptions, AdaptationOptions, *(row.options for row in DEFORMERS)):
         for name, known in options_of(group).items():
             assert known.sentence.endswith("."), name
-            assert known.label or known.kind == "pairs", name
+            assert known.label or known.kind in ("pairs", "strokes"), name
             assert known.accepts(getattr(group(), name)), name
 
 

@@ -58,6 +58,58 @@ LAPLACIANS = {
 """Laplacians by name: ``weights(centers, triangles)`` gives (n, n) symmetric weights, not negative, and (n,) masses."""
 
 
+Point = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Separation:
+    """Two parts that were pointed at to be taken apart, see `splap_editor.core.surface.separation.seam_between`.
+
+    Parameters
+    ----------
+    a, b : tuple of 3 floats
+        Places on the surface at rest, world units; one a part is enough. The nearest active splats are meant, so that
+        a stroke holds on another training of the same scene.
+    wider : int
+        So many seams more, or fewer if negative, than the one that parts them.
+    """
+
+    a: tuple[Point, ...]
+    b: tuple[Point, ...]
+    wider: int = option(0, "Seams beyond the one that parts them; negative: before it.", least=-24, most=24)
+
+    def __post_init__(self) -> None:
+        _check_parts(self)
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Two rims that were pointed at to be tied together by their best contacts.
+
+    Parameters
+    ----------
+    a, b : tuple of 3 floats
+        As in a `Separation`.
+    reach : float
+        Largest distance of two centres that are joined, in world units.
+    """
+
+    a: tuple[Point, ...]
+    b: tuple[Point, ...]
+    reach: float = option(0.0, "Largest distance of two centres that are joined.", above=0.0, unit="world")
+
+    def __post_init__(self) -> None:
+        _check_parts(self)
+
+
+def _check_parts(stroke: Separation | Joint) -> None:
+    """Raise a ValueError if a part is nowhere or an option is none."""
+    for name in ("a", "b"):
+        if not getattr(stroke, name):
+            raise ValueError(f"{name} needs at least one point")
+    check_options(stroke)
+
+
 @dataclass(frozen=True)
 class GraphOptions:
     """What makes two splats neighbours.
@@ -72,6 +124,10 @@ class GraphOptions:
         Number of geodesic neighbours the Laplacian is built from.
     cut, add : tuple of (int, int)
         Edges taken out of and put into the finished graph, as pairs of file rows.
+    separate : tuple of Separation
+        Parts taken apart, after cut and added edges, each in what the ones before it left.
+    join : tuple of Joint
+        Parts tied together, after that.
     neighborhood : str
         One of `NEIGHBORHOODS`.
     laplacian : str
@@ -94,6 +150,10 @@ class GraphOptions:
     )
     cut: tuple[tuple[int, int], ...] = option((), "Edges taken out of the finished graph, as pairs of file rows.")
     add: tuple[tuple[int, int], ...] = option((), "Edges put into the finished graph, as pairs of file rows.")
+    separate: tuple[Separation, ...] = option(
+        (), "Parts taken apart along the narrowest seam between the places pointed at.", strokes=Separation
+    )
+    join: tuple[Joint, ...] = option((), "Parts tied together by their best contacts.", strokes=Joint)
     neighborhood: str = option("geodesic", "Who counts as near a splat.", label="Nearest by", choices=NEIGHBORHOODS)
     laplacian: str = option(
         "stars", "How the stars of all splats become a Laplacian.", label="Laplacian", choices=LAPLACIANS
@@ -103,7 +163,7 @@ class GraphOptions:
         check_options(self)
 
 
-EDGE_OPTIONS = ("rule", "epsilon", "cut", "add")
+EDGE_OPTIONS = ("rule", "epsilon", "cut", "add", "separate", "join")
 """Options that the graph itself is made by; the others are for what is made of it."""
 
 

@@ -93,7 +93,7 @@ def splat_graph(
     ellipses : Ellipses
         Occupancy ellipses of n nodes.
     options : GraphOptions
-        Rule, tolerance and mended edges.
+        Rule, tolerance and mended edges; strokes become such in `splap_editor.engine.strokes`.
     progress : Progress
         Called with the share done.
 

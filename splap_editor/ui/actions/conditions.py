@@ -133,5 +133,6 @@ def has_fragments(state: State) -> bool:
 
 
 def has_mends(state: State) -> bool:
-    """Edges were cut or added by hand."""
-    return has_surface(state) and bool(state.scene.edit.graph.cut or state.scene.edit.graph.add)
+    """Edges were cut or added by hand or by strokes."""
+    graph = state.scene.edit.graph if has_surface(state) else None
+    return graph is not None and bool(graph.cut or graph.add or graph.separate or graph.join)

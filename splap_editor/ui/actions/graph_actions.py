@@ -116,7 +116,7 @@ class GraphActions:
 
     def clear_mends(self) -> None:
         """Take all cuts and additions back."""
-        self._change(replace(self._options, cut=(), add=()), "Clear mends")
+        self._change(replace(self._options, cut=(), add=(), separate=(), join=()), "Clear mends")
 
     @property
     def _options(self) -> GraphOptions:

@@ -189,6 +189,9 @@ class GraphPanel(QWidget):
         scene = self._session.scene
         options = scene.edit.graph if scene is not None else GraphOptions()
         words = f"{len(options.cut):,} cut and {len(options.add):,} added by hand" if options.cut or options.add else ""
+        for n, did in ((len(options.separate), "separated"), (len(options.join), "joined")):
+            if n:
+                words += f"{'; ' if words else ''}{did} by {n:,} stroke{'' if n == 1 else 's'}"
         if self._mending.kept is not None:
             words += f"{'; s' if words else 'S'}ide A has {np.count_nonzero(self._mending.kept):,} splats"
         self.mends.setText(words)
@@ -199,7 +202,7 @@ class GraphPanel(QWidget):
     def _wanted_options(self) -> GraphOptions:
         """What Apply would put in force: mends made meanwhile stay."""
         held = self._session.scene.edit.graph
-        return replace(self._wanted, cut=held.cut, add=held.add)
+        return replace(self._wanted, cut=held.cut, add=held.add, separate=held.separate, join=held.join)
 
     def _on_rule_changed(self, wanted: GraphOptions) -> None:
         if self._session.scene is None:

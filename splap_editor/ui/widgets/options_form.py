@@ -54,7 +54,8 @@ _WIDEST = 1e9
 
 def hints_of(group: Any) -> dict[str, FieldHint]:
     """Hints for the options of a group, or of its class, that a form can show."""
-    return {name: _hint(known) for name, known in options_of(group).items() if known.kind not in ("pairs", "length")}
+    unshown = ("pairs", "length", "strokes")
+    return {name: _hint(known) for name, known in options_of(group).items() if known.kind not in unshown}
 
 
 def _hint(known: Option) -> FieldHint:

@@ -1,0 +1,103 @@
+"""Strokes over two parts as the edges that they cut or add."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from splap_editor.core.graph.options import GraphOptions, Joint, Point
+from splap_editor.core.graph.splat_graph import SplatGraph, mended_graph
+from splap_editor.core.splats.occupancy import Ellipses
+from splap_editor.core.surface.geodesics import geodesic_distances
+from splap_editor.core.surface.joining import best_contacts
+from splap_editor.core.surface.separation import seam_between
+
+RIM = 2.0
+"""A joint looks for contacts up to so many times its reach from the places pointed at, along the surface."""
+
+
+def stroke_mends(
+    ellipses: Ellipses,
+    graph: SplatGraph,
+    options: GraphOptions,
+    *,
+    near: tuple[GraphOptions, GraphOptions] | None = None,
+) -> GraphOptions:
+    """Turn strokes into the edges that they cut and add.
+
+    Separations come first, in their order, each in the graph that the ones
+    before it left; then joints.
+
+    Parameters
+    ----------
+    ellipses : Ellipses
+        n nodes.
+    graph : SplatGraph
+        Theirs, with nothing cut or added.
+    options : GraphOptions
+    near : pair of GraphOptions, optional
+        Others and what this function gave for them: where strokes were only added since, it is gone on from.
+
+    Returns
+    -------
+    GraphOptions
+        Without strokes; ``cut`` and ``add`` name file rows.
+
+    Raises
+    ------
+    ValueError
+        Both parts of a stroke are nearest to the same splat.
+    """
+    separate, join = options.separate, options.join
+    mends = replace(options, separate=(), join=())
+    if near is not None and _goes_on_from(options, near[0]):
+        separate, join = separate[len(near[0].separate) :], join[len(near[0].join) :]
+        mends = replace(mends, cut=near[1].cut, add=near[1].add)
+    for stroke in separate:
+        first, second = nodes_at(ellipses, stroke.a), nodes_at(ellipses, stroke.b)
+        seam = seam_between(mended_graph(ellipses, graph, mends), first, second, wider=stroke.wider)
+        pairs = row_pairs(ellipses, seam.edges)
+        mends = replace(mends, cut=_sorted(set(mends.cut) | pairs), add=_sorted(_ordered(mends.add) - pairs))
+    for joint in join:
+        pairs = row_pairs(ellipses, joint_contacts(ellipses, mended_graph(ellipses, graph, mends), joint))
+        mends = replace(mends, cut=_sorted(_ordered(mends.cut) - pairs), add=_sorted(set(mends.add) | pairs))
+    return mends
+
+
+def joint_contacts(ellipses: Ellipses, graph: SplatGraph, joint: Joint) -> NDArray[np.int64]:
+    """(P, 2) nodes by which the two rims of a joint are best tied; a node near both belongs to the nearer part."""
+    apart = [
+        geodesic_distances(graph, nodes_at(ellipses, part), limit=RIM * joint.reach) for part in (joint.a, joint.b)
+    ]
+    first, second = np.flatnonzero(apart[0] < apart[1]), np.flatnonzero(apart[1] < apart[0])
+    return best_contacts(ellipses, first, second, graph.epsilon, reach=joint.reach)
+
+
+def nodes_at(ellipses: Ellipses, points: Iterable[Point]) -> NDArray[np.int64]:
+    """Nodes nearest to some points, ascending, each once."""
+    # A tree that is asked but a few times need not be a good one.
+    tree = cKDTree(ellipses.centers, balanced_tree=False, compact_nodes=False)
+    return np.unique(tree.query(np.array(list(points), np.float64).reshape(-1, 3))[1]).astype(np.int64)
+
+
+def row_pairs(ellipses: Ellipses, edges: NDArray[np.integer]) -> set[tuple[int, int]]:
+    """Pairs of nodes as pairs of file rows, the smaller first."""
+    return {(a, b) for a, b in np.sort(ellipses.rows[edges], axis=1).tolist()}
+
+
+def _goes_on_from(options: GraphOptions, before: GraphOptions) -> bool:
+    if (before.cut, before.add) != (options.cut, options.add):
+        return False
+    if options.separate[: len(before.separate)] != before.separate or options.join[: len(before.join)] != before.join:
+        return False
+    return not before.join or before.separate == options.separate
+
+
+def _ordered(pairs: Iterable[tuple[int, int]]) -> set[tuple[int, int]]:
+    return {(min(pair), max(pair)) for pair in pairs}
+
+
+def _sorted(pairs: set[tuple[int, int]]) -> tuple[tuple[int, int], ...]:
+    return tuple(sorted(pairs))
