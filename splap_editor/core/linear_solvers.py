@@ -129,6 +129,7 @@ def _column_groups(indptr, indices):
 
 @nb.njit(nogil=True, cache=True, fastmath=True)
 def _solve_three(groups, indptr, indices, data, inverse_pivots, order, b, x):
+    """Solve for three right-hand sides, groups of like columns of the factor at a time."""
     n = order.size
     work = np.empty((n, 3))
     for k in range(n):
@@ -238,6 +239,7 @@ def _backward_four(j, indptr, indices, data, inverse_pivots, work):
 
 @nb.njit(nogil=True, cache=True, fastmath=True)
 def _solve_many(indptr, indices, data, inverse_pivots, order, b, x):
+    """Solve for any number of right-hand sides, column by column of the factor."""
     n = order.size
     n_columns = b.shape[1]
     work = np.empty((n, n_columns))

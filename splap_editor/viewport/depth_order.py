@@ -12,6 +12,7 @@ _BINS = 1 << 16
 
 @nb.njit(nogil=True, cache=True)
 def _counting_sort_compiled(means, direction, order):
+    """Write rows from the farthest to the nearest along ``direction`` to ``order``; within a bin by row."""
     n = means.shape[0]
     keys = np.empty(n, np.float32)
     nearest, farthest = np.float32(np.inf), np.float32(-np.inf)

@@ -19,6 +19,7 @@ _BATCH = 4096
 
 @nb.njit(nogil=True, cache=True)
 def _project_compiled(means, colors, flags, cut, clip, width, height, screen):
+    """Write pixel x, y and depth of each centre to ``screen``; NaN if hidden, fainter than ``cut`` or behind."""
     for i in range(means.shape[0]):
         x, y, z = means[i, 0], means[i, 1], means[i, 2]
         w = clip[3, 0] * x + clip[3, 1] * y + clip[3, 2] * z + clip[3, 3]
@@ -124,6 +125,7 @@ def _near_path_plain(screen, path, radius, inside):
 
 @nb.njit(nogil=True, cache=True)
 def _near_path_compiled(screen, path, radius, inside):
+    """Whether each point of the screen lies within ``radius`` pixels of a path of straight pieces."""
     low_x = low_y = np.inf
     high_x = high_y = -np.inf
     for k in range(path.shape[0]):

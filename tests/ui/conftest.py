@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QCoreApplication, QEvent, QPoint, QSettings, Qt
+from PySide6.QtCore import QCoreApplication, QEvent, QPoint, QPointF, QSettings, Qt
+from PySide6.QtGui import QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
@@ -111,6 +112,16 @@ class Driver:
         for point in points[1:]:
             self.move(point)
         self.release(points[-1], button, modifiers)
+
+    def wheel(self, at: QPoint, notches: int, modifiers=Qt.KeyboardModifier.NoModifier) -> None:
+        """Turn the wheel, away from the person for positive notches."""
+        viewport = self.window.viewport
+        turn = QPoint(0, 120 * notches)
+        position, on_screen = QPointF(at), QPointF(viewport.mapToGlobal(at))
+        none, phase = Qt.MouseButton.NoButton, Qt.ScrollPhase.NoScrollPhase
+        QApplication.sendEvent(
+            viewport, QWheelEvent(position, on_screen, QPoint(), turn, none, modifiers, phase, False)
+        )
 
     def key(self, key: Qt.Key, modifiers=Qt.KeyboardModifier.NoModifier) -> None:
         # Shortcuts are those of the active window.

@@ -89,11 +89,14 @@ def test_arrow_never_leaves_its_axis(gizmo, projection, part):
     assert np.linalg.norm(np.cross(delta[:3, 3], gizmo.axes[:, part.axis])) < 1e-9
 
 
+@pytest.mark.parametrize("is_parallel", [False, True], ids=["perspective", "parallel"])
 @pytest.mark.parametrize("part", [*SQUARES, DOT])
-def test_grabbed_point_of_a_plane_stays_under_the_cursor(gizmo, projection, part):
-    normal = projection.direction if part == DOT else gizmo.axes[:, part.axis]
-    if not gizmo.is_part_shown(part, projection):
-        return
+def test_grabbed_point_of_a_plane_stays_under_the_cursor(gizmo, is_parallel, part):
+    # A square is grabbed where it is seen from the front, which no one view does with all three.
+    across, along = gizmo.axes[:, max(part.axis, 0)], gizmo.axes[:, (max(part.axis, 0) + 1) % 3]
+    projection = looking(is_parallel, position=4.0 * (across + 0.5 * along))
+    assert gizmo.is_part_shown(part, projection)
+    normal = projection.direction if part == DOT else across
     start = projection.pixel(gizmo.frame[:3, 3]) + np.array([4.0, -3.0])
     grabbed = projection.on_plane(*start, gizmo.frame[:3, 3], normal)
     delta = drag(gizmo, part, projection, start, start + np.array([60.0, 45.0]))

@@ -20,6 +20,11 @@ _HALF_ROOT_3 = 0.5 * math.sqrt(3.0)
 # Nodes fitted side by side: enough to fill vector registers many times, few enough for the processor's first cache.
 _LANES = 128
 
+# Rows of a lane. Of each vector three in a row: rest semi-axes, their images, the centre,
+_AXIS_1, _AXIS_2, _IMAGE_1, _IMAGE_2, _CENTER = 0, 3, 6, 9, 12
+# and what is fitted: the rotation row by row, semi-axes, their growths, cosine and sine of their turn in the plane.
+_ROTATION, _FITTED_1, _FITTED_2, _GROWTH_1, _GROWTH_2, _COSINE, _SINE, _N_ROWS = 15, 24, 27, 30, 31, 32, 33, 34
+
 
 class KernelArrays(NamedTuple):
     """What the compiled loops write.
@@ -62,14 +67,14 @@ def write_kernels(carriers, weights, motions, moved, resting, rotations, rest, o
     rest_means, rest_axes_f32, order, ellipses = rest
     means, turns, growths, twists, changed, means_f32, axes_f32 = out
     n = len(carriers)
-    lanes = np.zeros(34 * _LANES)
+    lanes = np.zeros(_N_ROWS * _LANES)
     for lo in range(0, n, _LANES):
         count = min(_LANES, n - lo)
         # Rows lie all over the file. Reading the places to be written lets the processor fetch them side by side.
         fetched = np.float32(0.0)
         for i in range(lo, lo + count):
             fetched += means_f32[order[i], 0] + axes_f32[order[i], 0, 0] + axes_f32[order[i], 1, 2]
-        lanes[0] = fetched
+        lanes[_AXIS_1] = fetched
         for lane in range(count):
             i = lo + lane
             any_moved = False
@@ -93,18 +98,18 @@ def write_kernels(carriers, weights, motions, moved, resting, rotations, rest, o
                 continue
             per_cutoff = ellipses[i, 11]
             for a in range(3):
-                means[i, a] = means_f32[row, a] = lanes[(12 + a) * _LANES + lane]
-                axes_f32[row, 0, a] = per_cutoff * lanes[(24 + a) * _LANES + lane]
-                axes_f32[row, 1, a] = per_cutoff * lanes[(27 + a) * _LANES + lane]
+                means[i, a] = means_f32[row, a] = lanes[(_CENTER + a) * _LANES + lane]
+                axes_f32[row, 0, a] = per_cutoff * lanes[(_FITTED_1 + a) * _LANES + lane]
+                axes_f32[row, 1, a] = per_cutoff * lanes[(_FITTED_2 + a) * _LANES + lane]
                 for b in range(3):
-                    turns[i, a, b] = lanes[(15 + 3 * a + b) * _LANES + lane]
-            growths[i, 0], growths[i, 1] = lanes[30 * _LANES + lane], lanes[31 * _LANES + lane]
-            twists[i, 0], twists[i, 1] = lanes[32 * _LANES + lane], lanes[33 * _LANES + lane]
+                    turns[i, a, b] = lanes[(_ROTATION + 3 * a + b) * _LANES + lane]
+            growths[i, 0], growths[i, 1] = lanes[_GROWTH_1 * _LANES + lane], lanes[_GROWTH_2 * _LANES + lane]
+            twists[i, 0], twists[i, 1] = lanes[_COSINE * _LANES + lane], lanes[_SINE * _LANES + lane]
 
 
 @nb.njit(inline="always")
 def _carry_triangle(i, lane, carriers, weights, motions, rotations, ellipses, lanes):
-    """Rows 0 to 14 of a lane: both rest semi-axes, their images under the triangle's affine map, and its centre."""
+    """Fill a lane with both rest semi-axes, their images under the triangle's affine map, and its centre."""
     mx = my = mz = ax = ay = az = bx = by = bz = 0.0
     for c in range(3):
         # Corner c of the triangle is the centre + along v1 + across v2.
@@ -137,13 +142,12 @@ def _carry_triangle(i, lane, carriers, weights, motions, rotations, ellipses, la
             mx, my, mz = ellipses[i, 0] + share * x, ellipses[i, 1] + share * y, ellipses[i, 2] + share * z
     ax, ay, az = 2.0 * third * ax, 2.0 * third * ay, 2.0 * third * az
     bx, by, bz = 2.0 * third * bx, 2.0 * third * by, 2.0 * third * bz
-    for k in range(6):
-        lanes[k * _LANES + lane] = ellipses[i, 3 + k]
-    lanes[6 * _LANES + lane], lanes[7 * _LANES + lane], lanes[8 * _LANES + lane] = ax, ay, az
-    lanes[9 * _LANES + lane], lanes[10 * _LANES + lane], lanes[11 * _LANES + lane] = bx, by, bz
-    lanes[12 * _LANES + lane] = mx
-    lanes[13 * _LANES + lane] = my
-    lanes[14 * _LANES + lane] = mz
+    for a in range(3):
+        lanes[(_AXIS_1 + a) * _LANES + lane] = ellipses[i, 3 + a]
+        lanes[(_AXIS_2 + a) * _LANES + lane] = ellipses[i, 6 + a]
+    _put(lanes, _IMAGE_1, lane, (ax, ay, az))
+    _put(lanes, _IMAGE_2, lane, (bx, by, bz))
+    _put(lanes, _CENTER, lane, (mx, my, mz))
     # Growths along the semi-axes, and that of the area between them: all squared.
     nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
     grow1 = ellipses[i, 9] ** 2 * (ax * ax + ay * ay + az * az)
@@ -158,7 +162,7 @@ def _carry_triangle(i, lane, carriers, weights, motions, rotations, ellipses, la
         for b in range(3):
             turned1 += rotations[i, a, b] * ellipses[i, 3 + b]
             turned2 += rotations[i, a, b] * ellipses[i, 6 + b]
-        lanes[(6 + a) * _LANES + lane], lanes[(9 + a) * _LANES + lane] = grow1 * turned1, grow2 * turned2
+        lanes[(_IMAGE_1 + a) * _LANES + lane], lanes[(_IMAGE_2 + a) * _LANES + lane] = grow1 * turned1, grow2 * turned2
 
 
 @nb.njit(inline="always")
@@ -175,19 +179,19 @@ def _squared_shift(motions, ellipses, j):
 def _fit_ellipses(count, lanes):
     """Split each lane's map of the rest plane into a stretch within the plane and a rotation.
 
-    Rows 15 to 33 receive the rotation, the semi-axes of the stretched ellipse, their growths, and the cosine and sine
-    of their turn from the rest axes they are within 45° of. Free of branches, and all in one array with rows a known
-    distance apart, so that the loop becomes vector instructions.
+    The rows from ``_ROTATION`` on receive the rotation, the semi-axes of the stretched ellipse, their growths, and the
+    cosine and sine of their turn from the rest axes they are within 45° of. Free of branches, and all in one array with
+    rows a known distance apart, so that the loop becomes vector instructions.
     """
     for lane in range(count):
-        v1 = (lanes[0 * _LANES + lane], lanes[1 * _LANES + lane], lanes[2 * _LANES + lane])
-        v2 = (lanes[3 * _LANES + lane], lanes[4 * _LANES + lane], lanes[5 * _LANES + lane])
+        v1 = _held(lanes, _AXIS_1, lane)
+        v2 = _held(lanes, _AXIS_2, lane)
         length1, length2 = math.sqrt(_dot(v1, v1)), math.sqrt(_dot(v2, v2))
         per1, per2 = 1.0 / length1, 1.0 / length2
         e1, e2 = _times(per1, v1), _times(per2, v2)
         e3 = _cross(e1, e2)
-        g1 = _times(per1, (lanes[6 * _LANES + lane], lanes[7 * _LANES + lane], lanes[8 * _LANES + lane]))
-        g2 = _times(per2, (lanes[9 * _LANES + lane], lanes[10 * _LANES + lane], lanes[11 * _LANES + lane]))
+        g1 = _times(per1, _held(lanes, _IMAGE_1, lane))
+        g2 = _times(per2, _held(lanes, _IMAGE_2, lane))
         # Polar decomposition of a 3 × 2 matrix: the rotation is the matrix plus its cofactor, to unit length.
         normal = _cross(g1, g2)
         area = math.sqrt(_dot(normal, normal))
@@ -222,19 +226,13 @@ def _fit_ellipses(count, lanes):
         growth2 = growth2 if growth2 > MIN_SHRINK else MIN_SHRINK
         axis1 = _times(growth1 * length1, _plus(_times(cosine, q1), _times(sine, q2)))
         axis2 = _times(growth2 * length2, _plus(_times(cosine, q2), _times(-sine, q1)))
-        lanes[15 * _LANES + lane] = q1[0] * e1[0] + q2[0] * e2[0] + q3[0] * e3[0]
-        lanes[16 * _LANES + lane] = q1[0] * e1[1] + q2[0] * e2[1] + q3[0] * e3[1]
-        lanes[17 * _LANES + lane] = q1[0] * e1[2] + q2[0] * e2[2] + q3[0] * e3[2]
-        lanes[18 * _LANES + lane] = q1[1] * e1[0] + q2[1] * e2[0] + q3[1] * e3[0]
-        lanes[19 * _LANES + lane] = q1[1] * e1[1] + q2[1] * e2[1] + q3[1] * e3[1]
-        lanes[20 * _LANES + lane] = q1[1] * e1[2] + q2[1] * e2[2] + q3[1] * e3[2]
-        lanes[21 * _LANES + lane] = q1[2] * e1[0] + q2[2] * e2[0] + q3[2] * e3[0]
-        lanes[22 * _LANES + lane] = q1[2] * e1[1] + q2[2] * e2[1] + q3[2] * e3[1]
-        lanes[23 * _LANES + lane] = q1[2] * e1[2] + q2[2] * e2[2] + q3[2] * e3[2]
-        lanes[24 * _LANES + lane], lanes[25 * _LANES + lane], lanes[26 * _LANES + lane] = axis1
-        lanes[27 * _LANES + lane], lanes[28 * _LANES + lane], lanes[29 * _LANES + lane] = axis2
-        lanes[30 * _LANES + lane], lanes[31 * _LANES + lane] = growth1, growth2
-        lanes[32 * _LANES + lane], lanes[33 * _LANES + lane] = cosine, sine
+        _put(lanes, _ROTATION, lane, _plus(_plus(_times(q1[0], e1), _times(q2[0], e2)), _times(q3[0], e3)))
+        _put(lanes, _ROTATION + 3, lane, _plus(_plus(_times(q1[1], e1), _times(q2[1], e2)), _times(q3[1], e3)))
+        _put(lanes, _ROTATION + 6, lane, _plus(_plus(_times(q1[2], e1), _times(q2[2], e2)), _times(q3[2], e3)))
+        _put(lanes, _FITTED_1, lane, axis1)
+        _put(lanes, _FITTED_2, lane, axis2)
+        lanes[_GROWTH_1 * _LANES + lane], lanes[_GROWTH_2 * _LANES + lane] = growth1, growth2
+        lanes[_COSINE * _LANES + lane], lanes[_SINE * _LANES + lane] = cosine, sine
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract"})
@@ -274,6 +272,7 @@ def adapt_inert(carriers, weights, rest, positions, rotations, moved, out):
 
 @nb.njit(inline="always")
 def _write_rest(i, row, rest_means, rest_axes_f32, means, turns, growths, twists, changed, means_f32, axes_f32):
+    """Put a splat that nothing has moved at rest."""
     for a in range(3):
         means[i, a] = means_f32[row, a] = rest_means[i, a]
         axes_f32[row, 0, a] = rest_axes_f32[i, 0, a]
@@ -286,27 +285,46 @@ def _write_rest(i, row, rest_means, rest_axes_f32, means, turns, growths, twists
 
 
 @nb.njit(inline="always")
+def _held(lanes, row, lane):
+    """Vector that begins in a row of a lane."""
+    return lanes[row * _LANES + lane], lanes[(row + 1) * _LANES + lane], lanes[(row + 2) * _LANES + lane]
+
+
+@nb.njit(inline="always")
+def _put(lanes, row, lane, vector):
+    """Write a vector from a row of a lane on."""
+    lanes[row * _LANES + lane] = vector[0]
+    lanes[(row + 1) * _LANES + lane] = vector[1]
+    lanes[(row + 2) * _LANES + lane] = vector[2]
+
+
+@nb.njit(inline="always")
 def _dot(a, b):
+    """Dot product."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @nb.njit(inline="always")
 def _cross(a, b):
+    """Cross product."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @nb.njit(inline="always")
 def _plus(a, b):
+    """Sum."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
 @nb.njit(inline="always")
 def _times(s, a):
+    """Vector times a number."""
     return s * a[0], s * a[1], s * a[2]
 
 
 @nb.njit(inline="always")
 def _turned(rotations, i, a):
+    """Vector turned by the rotation of row i."""
     return (
         rotations[i, 0, 0] * a[0] + rotations[i, 0, 1] * a[1] + rotations[i, 0, 2] * a[2],
         rotations[i, 1, 0] * a[0] + rotations[i, 1, 1] * a[1] + rotations[i, 1, 2] * a[2],

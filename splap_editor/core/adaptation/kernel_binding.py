@@ -185,6 +185,7 @@ def _rest_axes(
 
 @nb.njit(nogil=True, cache=True)
 def _find_carriers(lo, hi, centers, semi_axes, indptr, indices, carriers, weights):
+    """Write the three nodes that carry each corner of the triangles of nodes lo to hi, and their weights."""
     half_root_3 = 0.5 * np.sqrt(3.0)
     offset = np.empty(3)
     nearest = np.empty(3, np.int32)
@@ -223,6 +224,7 @@ def _find_carriers(lo, hi, centers, semi_axes, indptr, indices, carriers, weight
 
 @nb.njit(nogil=True, cache=True)
 def _find_stencils(lo, hi, centers, indptr, indices, stencils, inverse_moments, dampings):
+    """Write the neighbours that nodes lo to hi find their affine maps from, with inverse moments and dampings."""
     for i in range(lo, hi):
         xx = xy = xz = yy = yz = zz = 0.0
         for k in range(stencils.shape[1]):

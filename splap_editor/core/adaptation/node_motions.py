@@ -124,6 +124,7 @@ def find_ring_motions(hops, indptr, indices, rest, positions, rotations, resting
 
 @nb.njit(inline="always")
 def _has_moved(i, rest, positions, rotations, still):
+    """Whether a node has moved farther than ``still``, or turned."""
     displaced = max(
         abs(positions[i, 0] - rest[i, 0]), abs(positions[i, 1] - rest[i, 1]), abs(positions[i, 2] - rest[i, 2])
     )

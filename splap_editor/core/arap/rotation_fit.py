@@ -68,6 +68,7 @@ def nearest_rotations(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @nb.njit(nogil=True, cache=True)
 def _fit_all(covariances, rotations):
+    """Write the rotation nearest to each covariance."""
     for i in range(covariances.shape[0]):
         C = covariances[i]
         w, x, y, z = rotation_quaternion(

@@ -149,6 +149,7 @@ def _aligned_shares(first, last, handles, values, screws, shares):
 
 @nb.njit(nogil=True, cache=True)
 def _dual_quaternion(rest, indptr, handles, values, screws, agree, excess, offsets, stretched):
+    """Blend each node's screws and stretches by its weights, the missing share at rest."""
     n = rest.shape[0]
     positions = np.empty((n, 3))
     rotations = np.empty((n, 3, 3))

@@ -246,6 +246,7 @@ def two_way_touch(discs, i, j, epsilon, limit):
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")
 def _touch_scales(discs, pairs, epsilon):
+    """Touch scale of each pair, (E,)."""
     out = np.empty(len(pairs))
     for e in range(len(pairs)):
         out[e] = two_way_touch(discs, pairs[e, 0], pairs[e, 1], epsilon, np.inf)
@@ -275,6 +276,7 @@ def _reaches_height(height, c0, c1, a00, a01, a10, a11, z0, g0, g1):
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")
 def _one_way_offset(discs, i, j):
+    """Least height of ellipse j over ellipse i within the normal column of i; inf where j does not reach into it."""
     c0, c1, a00, a01, a10, a11, z0, g0, g1 = _in_frame(discs, i, j)
     squared, y0, y1 = _meeting(c0, c1, a00, a01, a10, a11, 1.0)
     if squared > 1.0:
@@ -296,6 +298,7 @@ def _one_way_offset(discs, i, j):
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")
 def _normal_offsets(discs, pairs):
+    """Offset of each pair as either end sees it, (E, 2)."""
     out = np.empty((len(pairs), 2))
     for e in range(len(pairs)):
         out[e, 0] = _one_way_offset(discs, pairs[e, 0], pairs[e, 1])

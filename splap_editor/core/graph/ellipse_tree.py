@@ -3,8 +3,8 @@
 The ellipses are split into classes of similar size, each with its own implicit
 binary tree over its Morton order:
 
-    slot 1 ─┬─ 2 ─┬─ 4 ── leaf: ellipses 0 to 7 of the class
-            │     └─ 5 ── leaf: ellipses 8 to 15
+    slot 1 ─┬─ 2 ─┬─ 4 ── leaf: ellipses 0 to 3 of the class
+            │     └─ 5 ── leaf: ellipses 4 to 7
             └─ 3 ─┬─ 6 …
 
 A slot knows the box of its centres and how far its ellipses extend from them

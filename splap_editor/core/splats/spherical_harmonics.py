@@ -29,6 +29,7 @@ _DIRECTIONS /= np.linalg.norm(_DIRECTIONS, axis=1, keepdims=True)
 
 @nb.njit(inline="always")
 def _write_basis(x, y, z, degree, out):
+    """Write the basis functions of degrees 1 to ``degree`` in a direction to ``out``, band by band."""
     xx, yy, zz = x * x, y * y, z * z
     if degree >= 1:
         out[0] = -0.4886025119029199 * y
@@ -228,6 +229,7 @@ _INVERSES = _band_inverses()
 
 @nb.njit(nogil=True, cache=True)
 def _rotate_sh(coefficients, rotations, changed, degree):
+    """Turn the coefficients of changed splats in place, each band from its values in a few directions."""
     basis = np.empty((9, 24))
     values = np.empty((9, 3))
     for i in range(len(coefficients)):
@@ -269,6 +271,7 @@ def _rotate_sh(coefficients, rotations, changed, degree):
 
 @nb.njit(nogil=True, cache=True, fastmath={"contract", "reassoc", "arcp", "nsz"})
 def _view_colors_compiled(sh0, shN, positions, rotations, camera, degree, colors):
+    """Write the colour of each splat as the camera sees it, in the frame that its rotation has turned."""
     basis = np.empty(24, np.float32)
     n_coefficients = shN.shape[1]
     for i in range(len(positions)):
