@@ -5,10 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.splats.main_subject import main_subject
 from splap_editor.core.splats.splats import Splats
 
 GIANT = 0.25
-"""A splat is giant if one standard deviation is longer than this share of the scene's inner 98 % box."""
+"""A splat is giant if one standard deviation is longer than this share of the main subject."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +66,7 @@ def lint(splats: Splats) -> list[Finding]:
 
     Beside `unusable_rows`: rows that are zero throughout, positions that occur
     more than once (every row after the first), and giant splats (longer than
-    `GIANT` of the box that holds the middle 98 % of centres along each axis).
+    `GIANT` of the main subject).
     Takes seconds per million splats.
     """
     findings = unusable_rows(splats)
@@ -79,8 +80,8 @@ def lint(splats: Splats) -> list[Finding]:
     duplicates = np.zeros(len(means), bool)
     duplicates[order[1:]] = same
     _add(findings, "duplicates", "{} the position of an earlier splat", duplicates)
-    low, high = np.percentile(means, [1, 99], axis=0)
-    side = (high - low).max()
+    usable = np.isfinite(means).all(axis=1) & np.isfinite(splats.opacities)
+    side = main_subject(means[usable], splats.opacities[usable]).size
     if side > 0:
         longest = np.asarray(splats.log_scales).max(axis=1)
         giant = (longest > np.log(GIANT * side)) & (longest < np.inf)

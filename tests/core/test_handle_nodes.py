@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from splap_editor.core.handle_nodes import Region, handle_nodes
+from splap_editor.core.splats.main_subject import MainSubject
 from splap_editor.core.splats.occupancy import Ellipses
 
 
@@ -18,7 +19,7 @@ def _ellipses(centers, inert_rows=()):
         normals=np.tile([0.0, 0.0, 1.0], (n, 1)),
         cutoffs=np.ones(n),
         axes=np.tile(np.array([0, 1, 2], np.int8), (n, 1)),
-        scene_scale=10.0,
+        subject=MainSubject(10.0, np.zeros(3), 5.0 * np.eye(3)),
         n_splats=n_splats,
         inert=inert,
     )

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.index_spaces import FileRows, Nodes
+from splap_editor.core.splats.main_subject import MainSubject, main_subject
 from splap_editor.core.splats.morton import morton_order
 from splap_editor.core.splats.rotations import quats_to_matrices
 from splap_editor.core.splats.splats import Splats
@@ -61,8 +62,8 @@ class Ellipses:
     axes : (n, 3) int8
         Stored scale and rotation column that the major axis, the minor axis
         and the normal come from.
-    scene_scale : float
-        Size s of the scene in world units, see `scene_scale`; positive.
+    subject : MainSubject
+        What the scene is of; its size is positive.
     n_splats : int
         Number of splats N in the file, inert ones included.
     inert : (N,) uint8
@@ -75,7 +76,7 @@ class Ellipses:
     normals: NDArray[np.float64]
     cutoffs: NDArray[np.float64]
     axes: NDArray[np.int8]
-    scene_scale: float
+    subject: MainSubject
     n_splats: int
     inert: NDArray[np.uint8]
 
@@ -83,6 +84,11 @@ class Ellipses:
     def n_nodes(self) -> int:
         """Number of active splats n."""
         return len(self.rows)
+
+    @property
+    def scene_scale(self) -> float:
+        """Size s of the scene: the longest side of its main subject, in world units."""
+        return self.subject.size
 
     @cached_property
     def node_of_row(self) -> Nodes:
@@ -149,7 +155,6 @@ def occupancy_ellipses(splats: Splats, *, min_contribution: float = MIN_CONTRIBU
     major = cutoffs * sigmas[rows, 0]
     minor = np.maximum(cutoffs * sigmas[rows, 1], NEEDLE_FLOOR * major)
     semi_axes = columns[:, :2] * np.stack([major, minor], axis=1)[:, :, None]
-    scale = scene_scale(centers) or 2.0 * float(major.max(initial=0.0)) or 1.0
     return Ellipses(
         rows=rows,
         centers=centers,
@@ -157,35 +162,19 @@ def occupancy_ellipses(splats: Splats, *, min_contribution: float = MIN_CONTRIBU
         normals=np.cross(columns[:, 0], columns[:, 1]),
         cutoffs=cutoffs,
         axes=axes,
-        scene_scale=scale,
+        subject=_subject(centers, opacities[rows], major),
         n_splats=splats.n_splats,
         inert=inert,
     )
 
 
-def scene_scale(points: NDArray[np.float64]) -> float:
-    """Size of a scene: the largest side of its bounding box, far floaters left out.
-
-    Points count that lie no farther outside the box of the middle 96 % (axis
-    by axis) than that box is long. So on a clean scene the result is the plain
-    bounding box's, and one splat in fifty flung away does not change it.
-
-    Parameters
-    ----------
-    points : (n, 3) float64
-        Centres in world units.
-
-    Returns
-    -------
-    float
-        World units; 0 if there are no points or all coincide.
-    """
-    if not len(points):
-        return 0.0
-    low, high = np.quantile(points, [0.02, 0.98], axis=0)
-    margin = float((high - low).max())
-    kept = points if margin == 0.0 else points[((points >= low - margin) & (points <= high + margin)).all(axis=1)]
-    return float((kept.max(axis=0) - kept.min(axis=0)).max())
+def _subject(centers: NDArray[np.float64], opacities: NDArray[np.float64], major: NDArray[np.float64]) -> MainSubject:
+    """The main subject; where all centres coincide, a cube as large as the largest splat, or of side 1."""
+    subject = main_subject(centers, opacities)
+    if subject.size > 0.0:
+        return subject
+    half = float(major.max(initial=0.0)) or 0.5
+    return MainSubject(2.0 * half, subject.center, half * np.eye(3))
 
 
 def _ordered_axes(scales: NDArray[np.float64], normal_axis: int | None) -> NDArray[np.int8]:

@@ -94,12 +94,9 @@ def test_shuffling_the_file_leaves_the_graph(rule):
 @pytest.mark.parametrize("rule", RULES)
 def test_turning_and_scaling_the_scene_leaves_the_graph(rule):
     scene = ball(250)
-    # The scene scale is measured along the axes, so the tolerance is given in world units here.
-    scale = occupancy_ellipses(scene).scene_scale
     rows, graph = graph_of(scene, rule)
     turned = moved(scene, Rotation.from_rotvec([0.4, 1.0, -2.0]), 30.0, np.array([7.0, 8.0, 9.0]))
-    epsilon = 0.005 * 30.0 * scale / occupancy_ellipses(turned).scene_scale
-    other_rows, other = graph_of(turned, rule, epsilon=epsilon)
+    other_rows, other = graph_of(turned, rule)
     assert row_edges(other_rows, other.edges) == row_edges(rows, graph.edges)
 
 

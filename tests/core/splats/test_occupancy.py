@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from splap_editor.core.splats.occupancy import InertReason, occupancy_ellipses, scene_scale
+from splap_editor.core.splats.occupancy import InertReason, occupancy_ellipses
 from tests.core.splat_scenes import SIGMA_CUT, ball, cloud, moved, shuffled, splats_of
 from tests.reference.graph import occupancy_ellipse
 
@@ -101,30 +101,10 @@ def test_a_scene_of_inert_splats_has_no_ellipse():
     assert ellipses.n_nodes == 0 and ellipses.n_splats == 5 and ellipses.scene_scale > 0.0
 
 
-def test_the_scene_scale_is_the_bounding_box_of_a_clean_scene():
-    points = np.random.default_rng(0).normal(size=(2000, 3)) * [3.0, 1.0, 0.2]
-    assert scene_scale(points) == np.ptp(points, axis=0).max()
-    assert scene_scale(np.array([[0.0, 0, 0], [0, 2, 0]])) == 2.0
-
-
-@pytest.mark.parametrize("direction", ["one", "all"])
-def test_one_splat_in_a_hundred_flung_far_away_leaves_the_scene_scale(direction):
-    rng = np.random.default_rng(3)
-    points = ball(5000).means
-    scale = scene_scale(points)
-    flung = rng.choice(5000, 50, replace=False)
-    offsets = rng.normal(size=(50, 3)) if direction == "all" else np.array([1.0, 0.2, 0.1])
-    points = points.copy()
-    points[flung] += 100.0 * scale * offsets / np.linalg.norm(offsets, axis=-1, keepdims=True)
-    # The flung splats may have been the outermost ones.
-    assert abs(scene_scale(points) / scale - 1.0) < 0.01
-
-
-def test_the_scene_scale_of_coinciding_points_is_zero_but_a_scene_of_them_has_the_size_of_its_splats():
-    assert scene_scale(np.ones((4, 3))) == 0.0
-    assert scene_scale(np.empty((0, 3))) == 0.0
+def test_coinciding_splats_have_the_size_of_the_largest():
     ellipses = occupancy_ellipses(splats_of(np.ones((4, 3)), np.array([0.5, 0.2])))
     assert np.isclose(ellipses.scene_scale, 1.0)
+    np.testing.assert_allclose(ellipses.subject.center, 1.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("least", [0.0, 1.0, -0.1])

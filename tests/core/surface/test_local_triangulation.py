@@ -57,9 +57,7 @@ def test_moving_and_shuffling_the_scene_leaves_the_triangles():
     ellipses, neighborhoods = stages(scene)
     rows = {frozenset(triangle) for triangle in ellipses.rows[local_triangulations(ellipses, neighborhoods)].tolist()}
     turned = moved(scene, Rotation.from_rotvec([1.0, 2.0, 3.0]), 12.0, np.array([1.0, 1.0, 1.0]))
-    # The tolerance is relative to a bounding box along the axes.
-    same = 0.005 * 12.0 * ellipses.scene_scale / occupancy_ellipses(turned).scene_scale
-    others, near = stages(turned, same)
+    others, near = stages(turned)
     assert rows == {frozenset(triangle) for triangle in others.rows[local_triangulations(others, near)].tolist()}
     others, near = stages(shuffled(scene, order))
     again = order[others.rows[local_triangulations(others, near)]]
