@@ -70,7 +70,7 @@ CONTEXT_MENU = (
     "select.show_all",
     "",
     "view.frame_selection",
-    "view.frame_all",
+    "view.home",
 )
 LAYOUT_VERSION = 1
 

@@ -294,8 +294,16 @@ class Camera:
         """Orthographic or perspective; what is at the focal point keeps its size."""
         self.view = replace(self.view, is_parallel=is_parallel)
 
-    def fit_clipping(self, bounds: NDArray[np.float64]) -> None:
-        """Set near and far so that a world box, ``((3,) low, (3,) high)``, lies between."""
+    def fit_clipping(self, bounds: NDArray[np.float64], subject: NDArray[np.float64] | None = None) -> None:
+        """Set near and far so that a world box, ``((3,) low, (3,) high)``, lies between.
+
+        Parameters
+        ----------
+        bounds : (2, 3) float64
+            Everything there is to see.
+        subject : (n, 3) float64, optional
+            Corners of what is looked at. How near the eye may come follows from it, not from far floaters.
+        """
         view = self.view
         depths = (box_corners(bounds) - view.position) @ view.direction
         reach = float(np.ptp(depths)) + 1e-6 * view.distance
@@ -303,7 +311,9 @@ class Camera:
         near = float(depths.min()) - 0.02 * reach
         if not view.is_parallel:
             far = max(far, 1e-3 * view.distance)
-            near = max(near, far * _NEAREST_SHARE)
+            aim = far if subject is None else float(((subject - view.position) @ view.direction).max())
+            # With the subject behind the eye, or very close to it, the far end alone must still be resolved.
+            near = max(near, _NEAREST_SHARE * float(np.clip(aim, _NEAREST_SHARE * far, far)))
         self.vtk.SetClippingRange(near, far)
 
     def projection(self) -> Projection:

@@ -241,7 +241,7 @@ class SceneView:
         self.viewport.gizmo.detach()
         if self._depicts is not scene.splats:
             self.depict(scene.splats)()
-        self.viewport.splats.load(self._depicted.rest, self._depicted.colors)
+        self.viewport.splats.load(self._depicted.rest, self._depicted.colors, scene.ellipses.subject)
         self.viewport.camera.world_up = np.array(self.preferred_up or suggested_up(scene.splats))
         self.viewport.reset_camera()
         self._show_flags()

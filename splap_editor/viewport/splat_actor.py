@@ -12,6 +12,7 @@ from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkDataObject, vtkPolyDa
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
 from splap_editor.core.index_spaces import RowsByPlace
+from splap_editor.core.splats.main_subject import MainSubject
 from splap_editor.core.twofold_loop import TwofoldLoop
 from splap_editor.resources import shader
 from splap_editor.viewport.glyphs import Glyphs
@@ -121,14 +122,15 @@ class SplatActor:
         Shapes at rest or deformed.
     colors : (N, 4) uint8
         Colour and opacity.
+    subject : MainSubject
+        What counts as the size of the scene, whatever floats about it.
     """
 
-    def __init__(self, glyphs: Glyphs, colors: NDArray[np.uint8]):
+    def __init__(self, glyphs: Glyphs, colors: NDArray[np.uint8], subject: MainSubject):
         n = len(glyphs.means)
         self.n_splats = n
-        self.origin = np.median(glyphs.means, axis=0) if n else np.zeros(3)
-        # Far floaters must not stretch what counts as the size of the scene.
-        self.extent = float(np.linalg.norm(np.ptp(np.percentile(glyphs.means, [1, 99], axis=0), axis=0))) if n else 1.0
+        self.subject = subject
+        self.origin = subject.center
         self.means = np.empty((n, 3), np.float32)
         self.axes_u = np.empty((n, 3), np.float32)
         self.axes_v = np.empty((n, 3), np.float32)
@@ -144,9 +146,7 @@ class SplatActor:
         self.shape[:, 1] = glyphs.cutoffs
         reaches = np.linalg.norm(np.hstack([glyphs.axes_u, glyphs.axes_v]), axis=1) * glyphs.cutoffs
         self.reach = float(np.median(reaches)) if n else 0.0
-        # Far floaters must not stretch what counts as the size of the scene.
-        core = np.ptp(np.percentile(glyphs.means, [1, 99], axis=0), axis=0) if n else np.zeros(3)
-        self.extent = max(float(np.linalg.norm(core)) + 2.0 * self.reach, 1e-9)
+        self.extent = max(2.0 * float(np.linalg.norm(subject.half_axes)) + 2.0 * self.reach, 1e-9)
         self._room = float(reaches.max(initial=0.0)) + 1e-6 * self.extent
         self.set_geometry(glyphs.means, glyphs.axes_u, glyphs.axes_v, glyphs.thickness)
         self.set_colors(colors)
@@ -286,7 +286,7 @@ class SplatActor:
     def twin(self, size_in_pixels: float = 1.0) -> "SplatActor":
         """A second actor with a copy of the data and the same look, for another window with so much finer pixels."""
         glyphs = Glyphs(self.means + self.origin, self.axes_u, self.axes_v, self.shape[:, 0], self.shape[:, 1])
-        twin = SplatActor(glyphs, self.colors)
+        twin = SplatActor(glyphs, self.colors, self.subject)
         twin.set_flags(self.flags)
         twin.look = replace(self._look, point_size_px=self._look.point_size_px * size_in_pixels)
         return twin

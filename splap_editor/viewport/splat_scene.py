@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from vtkmodules.vtkRenderingCore import vtkRenderer
 
 from splap_editor.core.index_spaces import FileRows, RowsByPlace
+from splap_editor.core.splats.main_subject import MainSubject, main_subject
 from splap_editor.viewport.depth_order import depth_order
 from splap_editor.viewport.edge_lines import EdgeLines
 from splap_editor.viewport.glyphs import Glyphs
@@ -61,6 +62,7 @@ class SplatScene:
         self.edges: EdgeLines | None = None
         self._original: SplatActor | None = None
         self._rest: Glyphs | None = None
+        self._subject_rows = np.empty(0, np.int64)
         self._flags = np.zeros(0, np.uint8)
         self._highlighted: FileRows | None = None
         self._looks = dict(DEFAULT_LOOKS)
@@ -71,13 +73,18 @@ class SplatScene:
 
     # Data ---------------------------------------------------------------------------------------------------------
 
-    def load(self, glyphs: Glyphs, colors: NDArray[np.uint8]) -> None:
-        """Show a new scene, at rest: its glyphs and colours (N, 4) uint8, in file order. The camera stays."""
+    def load(self, glyphs: Glyphs, colors: NDArray[np.uint8], subject: MainSubject | None = None) -> None:
+        """Show a new scene, at rest: its glyphs and colours (N, 4) uint8, in file order. The camera stays.
+
+        The main subject is found here where the caller does not know it.
+        """
         self.clear()
         if not len(glyphs.means):
             return
         self._rest = glyphs
-        self.deformed = SplatActor(glyphs, colors)
+        subject = subject or main_subject(glyphs.means, np.asarray(colors[:, 3], np.float64) / 255.0)
+        self.deformed = SplatActor(glyphs, colors, subject)
+        self._subject_rows = np.flatnonzero(subject.holds(glyphs.means, room=self.deformed.reach))
         self._renderer.AddActor(self.deformed.actor)
         self._flags = np.zeros(self.deformed.n_splats, np.uint8)
         self.edges = EdgeLines(self.deformed, self._renderer)
@@ -198,7 +205,7 @@ class SplatScene:
             return
         is_both = self._compare is Compare.BOTH
         if self._compare is not Compare.DEFORMED and self._original is None:
-            self._original = SplatActor(self._rest, self.deformed.base_colors)
+            self._original = SplatActor(self._rest, self.deformed.base_colors, self.deformed.subject)
             self._original.set_flags(self._flags)
             # Blended actors are drawn in the order they were added: the ghost first, under the deformed splats.
             self._renderer.RemoveActor(self.deformed.actor)
@@ -232,6 +239,11 @@ class SplatScene:
         """(2, 3) box around all that is shown; None without a scene."""
         boxes = [actor.bounds() for actor in self.shown_actors()]
         return np.array([np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]]) if boxes else None
+
+    def subject_points(self) -> NDArray[np.float64]:
+        """(n, 3) where the splats of the main subject are in the picture, world units; none without a scene."""
+        actor = self.shown
+        return np.empty((0, 3)) if actor is None else actor.means[self._subject_rows] + actor.origin
 
     def prepare(self, projection: Projection, thinning: int, background: tuple[float, float, float]) -> None:
         """Bring uniforms, thinning and drawing order up to the picture that comes next."""

@@ -150,7 +150,7 @@ class Viewport:
         self.request_render()
 
     def reset_camera(self) -> None:
-        """Look at the whole scene from its home side: slightly from above, a quarter to the side."""
+        """Look at the main subject from its home side: slightly from above, a quarter to the side."""
         actor = self.splats.shown
         if actor is None:
             return
@@ -163,14 +163,18 @@ class Viewport:
         self.request_render()
 
     def frame(self, rows: ArrayLike | None = None) -> View:
-        """View in which these splats fill the picture, or all but far floaters; fly there or assign `camera.view`."""
+        """View in which these splats fill the picture, or the main subject; fly there or assign `camera.view`."""
         actor = self.splats.shown
         if actor is None:
             return self.camera.view
         if rows is None:
-            points = box_corners(np.percentile(actor.means, [0.5, 99.5], axis=0) + actor.origin)
-            return self.camera.frame(points, room=actor.reach)
+            return self.camera.frame(self.splats.subject_points(), room=actor.reach)
         return self.camera.frame(actor.means[np.asarray(rows)] + actor.origin, room=0.02 * actor.extent)
+
+    def frame_everything(self) -> View:
+        """View in which all splats are seen, far floaters too."""
+        box = self.splats.bounds()
+        return self.camera.view if box is None else self.camera.frame(box_corners(box))
 
     # Under the cursor ---------------------------------------------------------------------------------------------
 
@@ -236,7 +240,7 @@ class Viewport:
     def _on_frame_started(self, *_: object) -> None:
         box = self.splats.bounds()
         if box is not None:
-            self.camera.fit_clipping(box)
+            self.camera.fit_clipping(box, self.splats.deformed.subject.corners)
         projection = self.projection
         actor = self.splats.deformed
         thinning = self.thinning.choose(actor.n_splats) if actor and self.is_moving else 1

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from vtkmodules.vtkRenderingCore import vtkRenderer
@@ -226,6 +228,44 @@ def test_corner_axes_are_clicked_where_they_are_drawn():
             x, y = ends[i, :2].astype(int)
             assert np.abs(picture[y - 5, x] - 0.1).max() > 0.1
         assert viewport.hover_axes((20.0, 280.0)) is None
+
+
+def _with_floaters(n=400, share=0.3):
+    """Splats of a ball of radius 1, then floaters up to 40 away; all opaque."""
+    rng = np.random.default_rng(4)
+    n_far = round(share / (1.0 - share) * n)
+    glyphs, rgba = random_splats(n + n_far, size=0.1)
+    away = rng.normal(size=(n + n_far, 3))
+    away /= np.linalg.norm(away, axis=1, keepdims=True)
+    away[n:] *= rng.uniform(3.0, 40.0, (n_far, 1))
+    rgba[:, 3] = 1.0
+    return replace(glyphs, means=away), rgba, n
+
+
+def test_home_frames_the_subject_and_frame_everything_all_that_floats():
+    glyphs, rgba, n = _with_floaters()
+    with canvas(glyphs, rgba) as viewport:
+        viewport.reset_camera()
+        width, height = viewport.renderer.GetSize()
+        subject = viewport.projection.pixels(glyphs.means[:n])
+        assert (subject > 0).all() and (subject < (width, height)).all()
+        assert np.ptp(subject, axis=0).max() > 0.6 * height
+        assert np.linalg.norm(viewport.camera.view.focal_point) < 0.1
+        viewport.camera.view = viewport.frame_everything()
+        pixels = viewport.projection.pixels(glyphs.means)
+        assert (pixels > 0).all() and (pixels < (width, height)).all()
+        viewport.splats.move(glyphs.means + np.array([5.0, 0, 0]), glyphs.axes_u, glyphs.axes_v)
+        np.testing.assert_allclose(viewport.frame().focal_point, [5.0, 0, 0], atol=0.1)
+
+
+def test_how_near_the_eye_may_come_follows_from_the_subject():
+    glyphs, rgba, _ = _with_floaters()
+    glyphs.means[-1] = [0.0, 1e5, 0.0]
+    with canvas(glyphs, rgba) as viewport:
+        viewport.camera.view = replace(VIEW, position=np.array([0.0, -1.1, 0.0]))
+        drawn(viewport)
+        near, far = viewport.camera.vtk.GetClippingRange()
+        assert near < 0.01 and far > 1e5
 
 
 def test_reset_camera_shows_the_scene_upright_from_its_front():

@@ -52,7 +52,7 @@ class ViewActions(QObject):
         self._viewport.camera_moved()
 
     def frame_selection(self) -> None:
-        """Fly to the selection, else to the chosen handles, else to everything."""
+        """Fly to the selection, else to the chosen handles, else to the main subject."""
         scene = self._session.scene
         rows = np.flatnonzero(scene.selection & ~scene.hidden)
         if not len(rows):
@@ -60,10 +60,14 @@ class ViewActions(QObject):
         if len(rows):
             self.fly_to(self._viewport.frame(rows))
         else:
-            self.frame_all()
+            self.home()
 
-    def frame_all(self) -> None:
-        """Fly to where everything is in view; after the pose that is on its way, if one is, once more."""
+    def frame_everything(self) -> None:
+        """Fly to where all splats are in view, far floaters too."""
+        self.fly_to(self._viewport.frame_everything())
+
+    def home(self) -> None:
+        """Fly to where the main subject fills the picture; after the pose that is on its way, if one is, once more."""
         self.fly_to(self._viewport.frame())
         if self._session.state not in ("ready", "settled"):
             self._frame_again = self._ends[1]

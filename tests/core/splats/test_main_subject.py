@@ -105,9 +105,9 @@ def test_the_size_of_a_clean_capture_is_about_its_longest_side(name):
 
 def test_two_equal_things_far_apart_are_both_the_subject_but_a_small_one_is_not():
     means, opacities = CAPTURES["bench thin"]
-    both = main_subject(np.concatenate([means, means + [6.0, 0, 0]]), np.tile(opacities, 2))
+    both = main_subject(np.concatenate([means, means + np.array([6.0, 0, 0])]), np.tile(opacities, 2))
     assert abs(both.size - 8.6) < 0.1
-    few = means[::4] + [6.0, 0, 0]
+    few = means[::4] + np.array([6.0, 0, 0])
     one = main_subject(np.concatenate([means, few]), np.concatenate([opacities, opacities[::4]]))
     assert abs(one.size - 2.6) < 0.1
 
