@@ -17,7 +17,7 @@ _K = 8
 _FAINT = 0.25
 """Share of the median opacity below which a splat is haze wherever it lies."""
 
-_SPARSE = 2.5
+_SPARSE = 3.2
 """A splat belongs to no surface if its ``_K`` nearest lie so many times farther off than is usual."""
 
 _MUTUAL = 4
