@@ -41,6 +41,7 @@ def _look(splats: Splats) -> None:
     import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - registers the OpenGL implementations
     from vtkmodules.vtkRenderingCore import vtkRenderer
 
+    from splap_editor.core.splats.main_subject import main_subject
     from splap_editor.viewport.depth_order import depth_order
     from splap_editor.viewport.edge_lines import MOST_DRAWN, EdgeLines
     from splap_editor.viewport.glyphs import base_colors, splat_glyphs
@@ -52,7 +53,7 @@ def _look(splats: Splats) -> None:
     n = splats.n_splats
     view_colors(splats.sh0, splats.shN, np.zeros((n, 3)), np.broadcast_to(np.eye(3), (n, 3, 3)), np.zeros(3))
     depth_order(splats.means, np.array([0.0, 0.0, -1.0], np.float32))
-    actor = SplatActor(splat_glyphs(splats), base_colors(splats))
+    actor = SplatActor(splat_glyphs(splats), base_colors(splats), main_subject(splats.means, splats.opacities))
     actor.set_tints(np.zeros((n, 4), np.uint8))
     view = np.eye(4)
     view[2, 3] = -3.0
