@@ -143,7 +143,7 @@ class JsonObject:
             raise self.refuse(key, known.wanted)
         return float(value) if known.kind in ("number", "length") and value is not None else value
 
-    def strokes(self, key: str, kind: type[Group]) -> tuple[Group, ...]:
+    def strokes(self, key: str, kind: Callable[..., Group]) -> tuple[Group, ...]:
         """A list, perhaps empty, of strokes over two parts ``a`` and ``b``, with options of their own."""
         own = options_of(kind)
         found = []

@@ -90,12 +90,12 @@ def main_subject(points: NDArray[np.floating], opacities: NDArray[np.floating]) 
     MainSubject
         Of a clean scene, the smallest box about all centres, see `smallest_box`.
     """
-    points, opacities = np.asarray(points, np.float64), np.asarray(opacities, np.float64)
     if not len(points):
         return MainSubject(0.0, np.zeros(3), np.zeros((3, 3)))
-    middle = points.mean(axis=0)
-    points = _sample(points - middle, opacities)
-    kept = points[_subject_of(points)] if len(points) > 4 * _K else points
+    centers = np.asarray(points, np.float64)
+    middle = centers.mean(axis=0)
+    sample = _sample(centers - middle, np.asarray(opacities, np.float64))
+    kept = sample[_subject_of(sample)] if len(sample) > 4 * _K else sample
     center, half_axes = smallest_box(kept)
     return MainSubject(2.0 * float(np.linalg.norm(half_axes[0])), center + middle, half_axes)
 
