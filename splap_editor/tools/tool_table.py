@@ -12,6 +12,7 @@ from splap_editor.tools.lasso_tool import LassoTool
 from splap_editor.tools.navigate_tool import NavigateTool
 from splap_editor.tools.pin_tool import PinTool
 from splap_editor.tools.rectangle_tool import RectangleTool
+from splap_editor.tools.separate_tool import SeparateTool
 from splap_editor.tools.tool import Tool, ToolContext
 from splap_editor.tools.tool_manager import ToolManager
 from splap_editor.tools.transform_tool import TransformTool
@@ -58,6 +59,7 @@ TOOLS: tuple[ToolEntry, ...] = (
     ToolEntry(ClickTool, "&Click", "Shift+Q", "Select splats one by one; a drag looks around.", "Select"),
     ToolEntry(HandleTool, "&Handle", "W", "Click the surface to place a handle.", "Place handles and pins"),
     ToolEntry(PinTool, "&Pin", "E", "Click the surface to hold it in place.", "Place handles and pins"),
+    ToolEntry(SeparateTool, "&Separate", "", "Draw over two parts to take them apart.", "Mend the surface"),
     ToolEntry(InspectTool, "&Inspect", "I", "See a splat's card and neighbours, or an edge's.", "Inspect"),
 )
 
