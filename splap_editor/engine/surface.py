@@ -153,7 +153,9 @@ def surface_of(
         )
     require_mendable(ellipses, options)
     plain = unmended(options)
-    key = content_key((_made_by(plain), ellipses.centers, ellipses.semi_axes, ellipses.rows, plain))
+    # Tolerances are in units of the scene's size, which opacities have a say in too.
+    made_from = (ellipses.centers, ellipses.semi_axes, ellipses.rows, ellipses.scene_scale)
+    key = content_key((_made_by(plain), *made_from, plain))
     if near is not None and near.ellipses is ellipses and unmended(near.options) == plain:
         made = near.stages
     else:
