@@ -131,7 +131,7 @@ def test_two_selections_are_cut_apart_and_joined_again_and_the_edit_keeps_it(dri
     assert scene.surface.graph.components.max() == 0
     path = tmp_path / "edit.json"
     driver.session.save_edit(path)
-    assert read_recipe(path).graph.cut == scene.edit.graph.cut
+    assert read_recipe(path).options[GraphOptions].cut == scene.edit.graph.cut
     actions["graph.clear_mends"].trigger()
     driver.qtbot.waitUntil(lambda: scene.surface.options == GraphOptions(), timeout=WAIT_MS)
     assert scene.surface.graph.n_edges == surface.graph.n_edges
