@@ -121,8 +121,13 @@ class Documents:
 
     @property
     def would_lose(self) -> bool:
-        """Whether leaving the scene now would lose work: an edit neither saved nor exported, or keys not saved."""
-        return self.is_dirty and (self._session.has_unexported_edit or bool(self._session.scene.edit.timeline.keys))
+        """Whether leaving the scene now would lose work: an edit neither saved nor exported, or keys not saved.
+
+        Handles and pins are work before anything is moved by them.
+        """
+        if not self.is_dirty:
+            return False
+        return self._session.has_unexported_work or bool(self._session.scene.edit.timeline.keys)
 
     def file_of(self, state: SavedState, folder: Path | None) -> SessionFile:
         """Session file of a state, with the hash of the PLY as far as it is known."""

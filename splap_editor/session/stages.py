@@ -93,9 +93,19 @@ class Ledger:
     @property
     def has_unexported_edit(self) -> bool:
         """Whether the edit differs from the one last exported (or from the file's own pose)."""
+        exported = self.exported or Edit()
+        return not self._is_exported and not (self.scene.edit.is_identity and exported.is_identity)
+
+    @property
+    def has_unexported_work(self) -> bool:
+        """Whether there are handles or pins that no export had, moved or not, or such an edit."""
+        edit = self.scene.edit
+        return self.has_unexported_edit or (not self._is_exported and bool(edit.handles or edit.pins))
+
+    @property
+    def _is_exported(self) -> bool:
         edit, exported = self.scene.edit, self.exported or Edit()
-        is_same = binds_like(edit, exported) and poses_like(edit, exported)
-        return not is_same and not (edit.is_identity and exported.is_identity)
+        return binds_like(edit, exported) and poses_like(edit, exported)
 
     @property
     def state_at_rest(self) -> str:

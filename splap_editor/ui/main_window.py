@@ -392,6 +392,17 @@ class MainWindow(FileDrop, QMainWindow):
         geometry, layout = settings.value("window/geometry"), settings.value("window/layout")
         if geometry is None or not self.restoreGeometry(geometry):
             self.resize(1440, 900)
+        # The geometry may have been kept on a larger screen, or at a smaller scale.
+        room = self.screen().availableGeometry()
+        if not self.isFullScreen():
+            self.setMinimumSize(self.minimumSize().boundedTo(room.size()))
+            self.resize(self.size().boundedTo(room.size()))
+            spare = room.size() - self.size()
+            low = room.topLeft()
+            self.move(
+                min(max(self.x(), low.x()), low.x() + spare.width()),
+                min(max(self.y(), low.y()), low.y() + spare.height()),
+            )
         if layout is not None:
             self.restoreState(layout, LAYOUT_VERSION)
         self.actions_.check("view.panels", not self.dock.isHidden())

@@ -37,7 +37,7 @@ def own_settings(tmp_path: Path, qapp: QApplication) -> None:
     QSettings.setPath(QSettings.Format.IniFormat, QSettings.Scope.UserScope, str(tmp_path / "settings"))
 
 
-@pytest.fixture
+@pytest.fixture(autouse=True)
 def quiet(capfd: pytest.CaptureFixture[str]) -> Iterator[None]:
     """Fail a test during which anything was written to stderr, by Python or below it."""
     capfd.readouterr()

@@ -113,3 +113,15 @@ def test_a_click_on_an_end_of_the_corner_axes_looks_from_there(driver, qtbot):
     # The flight ends exactly there; the last direction shows it.
     qtbot.waitUntil(lambda: abs(viewport.camera.view.direction[2] + 1.0) < 1e-6, timeout=60_000)
     assert not driver.scene.edit.handles
+
+
+def test_a_path_can_be_typed_letter_by_letter(driver):
+    driver.window.actions_["file.export"].trigger()
+    dialog = next(widget for widget in QApplication.topLevelWidgets() if isinstance(widget, ExportDialog))
+    for typed in ("/nowhere/out", "~nobody/out", "../..", "./x", "/" + 300 * "n"):
+        for k in range(1, len(typed) + 1):
+            dialog.path_field.setText(typed[:k])
+            assert dialog.accept_button.isEnabled() or dialog.note.text(), typed[:k]
+    dialog.path_field.setText("/")
+    assert not dialog.accept_button.isEnabled() and dialog.note.text() == "This is a folder."
+    dialog.reject()

@@ -92,6 +92,22 @@ def test_closing_asks_before_an_edit_is_lost(driver, qtbot):
     assert not driver.window.isVisible()
 
 
+def test_quitting_asks_before_handles_and_pins_are_lost(driver):
+    quit_key = (Qt.Key.Key_Q, Qt.KeyboardModifier.ControlModifier)
+    region = Region(driver.scene.ellipses.centers[0], 0.1)
+    for place in (driver.session.add_pin, driver.session.add_handle):
+        place(region)
+        driver.wait_idle()
+        assert driver.scene.edit.is_identity
+        driver.key(*quit_key)
+        answer("Cancel")
+        assert driver.window.isVisible()
+        driver.session.history.undo()
+        driver.wait_idle()
+    driver.key(*quit_key)
+    assert not driver.window.isVisible(), "nothing is left to be lost"
+
+
 def test_cancel_stops_preparing_and_resume_goes_on(empty_window, qtbot):
     driver = Driver(empty_window, qtbot)
     driver.open(TUBE)

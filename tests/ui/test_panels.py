@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QLabel
 
 from splap_editor.core.arap.options import ArapOptions
 from splap_editor.core.handle_nodes import Region
@@ -152,3 +153,26 @@ def test_holding_the_key_shows_the_original(driver):
     assert splats.compare.value == "original"
     QTest.keyRelease(driver.window.viewport, Qt.Key.Key_O)
     assert splats.compare.value == "deformed"
+
+
+def cut_labels(window):
+    """Texts of which a line is not seen."""
+    labels = [label for label in window.dock.findChildren(QLabel) if label.isVisible() and label.wordWrap()]
+    return [label.text() for label in labels if label.height() < label.heightForWidth(label.width())]
+
+
+def test_no_line_of_the_panels_is_cut_while_the_surface_is_prepared_again(driver):
+    centers = driver.scene.ellipses.centers
+    driver.session.change_edit(replace(driver.scene.edit, method="bbw"), "Change method")
+    for tip in (centers[:, 2].argmin(), centers[:, 2].argmax()):
+        driver.session.add_handle(Region(centers[tip], 0.1))
+    driver.wait_idle()
+    assert len(driver.window.deformer_panel.weights.lines) == 2
+    epsilon = replace(driver.scene.edit.graph, epsilon=0.01)
+    driver.session.change_edit(driver.scene.edit.with_options(epsilon), "Change gap")
+    # A text, the room it needs and where that is found come in turn.
+    for _ in range(5):
+        QApplication.processEvents()
+    assert driver.session.state == "preparing"
+    assert cut_labels(driver.window) == []
+    driver.wait_idle()

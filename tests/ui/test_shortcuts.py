@@ -127,7 +127,7 @@ def values(controls):
 
 
 @pytest.mark.parametrize("frame_s", [0.0, 0.3])
-def test_the_wheel_over_the_panels_changes_nothing_but_the_scroll(driver, quiet, frame_s):
+def test_the_wheel_over_the_panels_changes_nothing_but_the_scroll(driver, frame_s):
     window, scene = driver.window, driver.scene
     window.viewport.frame_drawn.connect(lambda _: sleep(frame_s))
     scroll = window.dock.widget()

@@ -29,3 +29,31 @@ def test_a_display_without_opengl_or_that_does_not_answer_is_refused_in_one_sent
     assert run.returncode == 2, run.stderr
     assert run.stderr.startswith("splap-editor: ") and run.stderr.count("\n") == 1
     assert words in run.stderr and ": " in run.stderr.removeprefix("splap-editor: ")
+
+
+FIT = """
+import sys
+from PySide6.QtCore import QSettings
+from PySide6.QtWidgets import QApplication
+from splap_editor.ui.viewport_widget import ask_of_qt
+ask_of_qt()
+app = QApplication(sys.argv)
+from splap_editor.app import make_window
+QSettings.setDefaultFormat(QSettings.Format.IniFormat)
+QSettings.setPath(QSettings.Format.IniFormat, QSettings.Scope.UserScope, sys.argv[1])
+window = make_window()
+window.show()
+app.processEvents()
+print(window.screen().availableGeometry().contains(window.frameGeometry()), flush=True)
+window.close()
+"""
+
+
+def test_the_window_fits_the_screen_at_twice_the_scale(tmp_path):
+    # First as large as a window is by itself, then as it was kept on a screen of the plain scale.
+    for scale in ("2", "1", "2"):
+        environment = {**os.environ, "QT_SCALE_FACTOR": scale}
+        done = subprocess.run(
+            [sys.executable, "-c", FIT, str(tmp_path)], env=environment, capture_output=True, text=True, check=True
+        )
+        assert done.stdout == "True\n" and done.stderr == ""

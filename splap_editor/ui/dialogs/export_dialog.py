@@ -70,8 +70,10 @@ class ExportDialog(QDialog):
     @property
     def path(self) -> Path:
         """The file to write; ``.ply`` is added where no ending was given."""
-        path = Path(self.path_field.text().strip()).expanduser()
-        return path if path.suffix else path.with_suffix(".ply")
+        path = Path(os.path.expanduser(self.path_field.text().strip()))
+        # While it is typed it may be the root or "..", which have no name for an ending.
+        has_ending = path.suffix or path.name in ("", "..")
+        return path if has_ending else path.with_suffix(".ply")
 
     @property
     def as_3dgs(self) -> bool:
@@ -79,26 +81,29 @@ class ExportDialog(QDialog):
         return self.third_scale.isVisibleTo(self) and self.third_scale.isChecked()
 
     def _check(self) -> None:
-        text, tone, is_possible = "", "quiet", True
-        if not self.path_field.text().strip():
-            text, is_possible = "Name a file.", False
-        elif self.path.is_dir():
-            text, tone, is_possible = "This is a folder.", "danger", False
-        elif not self.path.parent.is_dir():
-            text, tone, is_possible = "There is no such folder.", "danger", False
-        elif not os.access(self.path.parent, os.W_OK):
-            text, tone, is_possible = "This folder cannot be written to.", "danger", False
-        elif self.path.exists():
-            same = self.path.resolve() == self._source.resolve()
-            text = (
-                "This is the file that is open; it will be replaced."
-                if same
-                else "This file exists and will be replaced."
-            )
-            tone = "warning"
+        try:
+            text, tone, is_possible = self._verdict()
+        except OSError as error:
+            text, tone, is_possible = f"{error.strerror or error}.", "danger", False
         self.note.setText(text)
         set_tone(self.note, tone)
         self.accept_button.setEnabled(is_possible)
+
+    def _verdict(self) -> tuple[str, str, bool]:
+        """What to say of the path, in which tone, and whether it can be written."""
+        if not self.path_field.text().strip():
+            return "Name a file.", "quiet", False
+        if self.path.is_dir():
+            return "This is a folder.", "danger", False
+        if not self.path.parent.is_dir():
+            return "There is no such folder.", "danger", False
+        if not os.access(self.path.parent, os.W_OK):
+            return "This folder cannot be written to.", "danger", False
+        if not self.path.exists():
+            return "", "quiet", True
+        if self.path.resolve() == self._source.resolve():
+            return "This is the file that is open; it will be replaced.", "warning", True
+        return "This file exists and will be replaced.", "warning", True
 
     def _on_browse_clicked(self) -> None:
         dialog = QFileDialog(self, "Export PLY", str(self.path))
