@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.splats.main_subject import main_subject
 from splap_editor.core.splats.splats import Splats
 
 GIANT = 0.25
@@ -81,6 +80,9 @@ def lint(splats: Splats) -> list[Finding]:
     duplicates[order[1:]] = same
     _add(findings, "duplicates", "{} the position of an earlier splat", duplicates)
     usable = np.isfinite(means).all(axis=1) & np.isfinite(splats.opacities)
+    # Looking for neighbours needs scipy, which those who only read a file do not wait for.
+    from splap_editor.core.splats.main_subject import main_subject
+
     side = main_subject(means[usable], splats.opacities[usable]).size
     if side > 0:
         longest = np.asarray(splats.log_scales).max(axis=1)
