@@ -166,7 +166,7 @@ def test_the_same_recipe_gives_the_same_splats_from_window_and_command_line(driv
         driver.session.exported.connect(written)
         driver.session.export(tmp_path / "window.ply")
     code = command_line(
-        ["deform", str(TUBE), "--recipe", str(tmp_path / "edit.json"), "-o", str(tmp_path / "line.ply")]
+        ["deform", str(TUBE), "--quiet", "--recipe", str(tmp_path / "edit.json"), "-o", str(tmp_path / "line.ply")]
     )
     assert code == 0
     assert (tmp_path / "window.ply").read_bytes() == (tmp_path / "line.ply").read_bytes()
