@@ -36,6 +36,8 @@ class DeformerRow:
         Modules that the one that binds imports by names out of a table: source of what it makes.
     ready : str
         ``"module:name"`` of ``ready(surface)``, which makes what the first drag would wait for; empty for nothing.
+    tip : str
+        What an artist would call it.
     """
 
     method: str
@@ -48,6 +50,7 @@ class DeformerRow:
     has_weights: bool = False
     named: tuple[str, ...] = ()
     ready: str = ""
+    tip: str = ""
 
     @property
     def bound_by(self) -> tuple[type, ...]:
@@ -76,6 +79,7 @@ DEFORMERS = [
             has_free_radius=True,
             named=(solver.module,),
             ready="splap_editor.core.arap.binding:ready_arap",
+            tip="A soft move that keeps shape: what lies near a handle follows it and turns rather than stretches.",
         )
         for kind, solver in ARAP_SOLVERS.items()
     ),
@@ -85,6 +89,7 @@ DEFORMERS = [
         BbwOptions,
         "splap_editor.core.bbw.binding:bind_bbw",
         has_weights=True,
+        tip="Smooth skinning: each handle pulls what lies in its cage, as bones do, and joints bend between them.",
     ),
 ]
 """The first is the default."""
@@ -93,6 +98,11 @@ DEFORMERS = [
 def method_titles() -> dict[str, str]:
     """Title of each method."""
     return {row.method: row.title for row in DEFORMERS}
+
+
+def method_tips() -> dict[str, str]:
+    """Tip of each method."""
+    return {row.method: row.tip for row in DEFORMERS}
 
 
 def deformer_row(method: str, options: OptionSet) -> DeformerRow:

@@ -39,7 +39,7 @@ def splat_weights(surface: Surface, deformer: BbwDeformer, column: int) -> NDArr
 
 
 def weight_lines(edit: Edit, report: BbwReport) -> list[tuple[str, str]]:
-    """Say how good the weights are, and what they do not reach.
+    """Say in an artist's words whether the weights are good, and what they do not reach.
 
     Parameters
     ----------
@@ -63,19 +63,28 @@ def weight_lines(edit: Edit, report: BbwReport) -> list[tuple[str, str]]:
                 )
             )
             continue
-        n = qp.n_factorisations
-        lines.append(
-            (
-                f"{handle.name}: {report.n_unknowns[index]:,} splats, {n} factorisation{'s' if n != 1 else ''}, "
-                f"KKT residual {qp.kkt_residual:.0e}, bounds met {_closely(qp.bound_violation)}"
-                + (", by the interior-point fallback since the active set did not settle." if qp.fallback else "."),
-                "warning" if qp.fallback or qp.kkt_residual > KKT_WARNING else "quiet",
-            )
-        )
+        is_rough = qp.fallback or qp.kkt_residual > KKT_WARNING
+        quality = "; they are rough, so look at them before you trust them (Shift+W)" if is_rough else ""
+        words = f"{handle.name} pulls {report.n_unknowns[index]:,} splats{quality}."
+        lines.append((words, "warning" if is_rough else "quiet"))
     if report.n_specks:
         lines.append((f"{report.n_specks:,} splats in loose specks follow their nearest neighbour.", "quiet"))
     if report.n_resting:
         lines.append((f"{report.n_resting:,} splats in pieces that no handle touches stay at rest.", "quiet"))
+    return lines
+
+
+def weight_figures(edit: Edit, report: BbwReport) -> list[str]:
+    """How well the weights of each handle are solved, in numbers: a line for each that reaches anything."""
+    lines = []
+    for index, (handle, qp) in enumerate(zip(edit.active_handles, report.handles, strict=True)):
+        if index not in report.unreachable:
+            n = qp.n_factorisations
+            lines.append(
+                f"{handle.name}: {n} factorisation{'s' if n != 1 else ''}, KKT residual {qp.kkt_residual:.0e}, "
+                f"bounds met {_closely(qp.bound_violation)}"
+                + (", by the interior-point fallback since the active set did not settle" if qp.fallback else "")
+            )
     return lines
 
 

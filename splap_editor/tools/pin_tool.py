@@ -17,6 +17,8 @@ class PinTool(DiscTool):
     """A click holds the disc under the pointer where it is."""
 
     name = "pin"
+    # What was placed last lies where the next click goes.
+    mutes_gizmo = True
     option_kinds = (PinOptions,)
     bindings = (Binding(("Click",), DiscTool.place, "Pin it where it is", "pin it", on="the surface"), RESIZE)
 

@@ -189,6 +189,7 @@ class Tool:
     option_kinds: ClassVar[tuple[type, ...]] = ()
     needs_scene: ClassVar[bool] = True
     yields_to_orbit: ClassVar[bool] = False
+    mutes_gizmo: ClassVar[bool] = False
 
     def __init__(self, context: ToolContext) -> None:
         self.context = context

@@ -65,6 +65,8 @@ class ToolManager:
             self.cancel()
             self.chosen.left()
             self._chosen = name
+            self.context.viewport.gizmo.is_muted = self.chosen.mutes_gizmo
+            self.context.viewport.gizmo_changed()
             self.chosen_changed.emit()
             self._tell_hint()
 

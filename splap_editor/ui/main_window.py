@@ -61,6 +61,7 @@ HINT = ("Click the surface to place a handle.", "Drag the arrows.")
 CONTEXT_MENU = (
     "handle.from_selection",
     "handle.pin_selection",
+    "handle.pin_rest",
     "",
     "handle.reset",
     "handle.delete",

@@ -196,6 +196,7 @@ def style_sheet() -> str:
     #sectionHeader {{ text-align: left; padding: 8px; font-weight: 600; border-radius: 0; }}
     #sectionHeader, #sectionHeader:checked {{ background: {PANEL}; color: {TEXT}; }}
     #sectionHeader:hover, #sectionHeader:checked:hover {{ background: {RAISED}; }}
+    #detailsHeader, #detailsHeader:checked {{ background: transparent; color: {QUIET}; padding: 2px; }}
     #handleRow {{ border-radius: 4px; }}
     #handleRow[active="true"] {{ background: {RAISED}; }}
     QLabel[tone="quiet"] {{ color: {QUIET}; }}

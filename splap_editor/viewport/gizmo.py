@@ -63,6 +63,8 @@ class Gizmo:
         Axes of the frame instead of those of the world.
     scale : float
         Device pixels per logical pixel.
+    is_muted : bool
+        No part is shown or found, but the one that is dragged by key.
     size_px, grab_px : float
         Length of an arrow and reach of the cursor in logical pixels.
     angle_snap_rad, scale_snap : float
@@ -71,6 +73,7 @@ class Gizmo:
 
     acts: frozenset[Act] = frozenset(Act)
     is_local: bool = False
+    is_muted: bool = False
     scale: float = 1.0
     size_px: float = 88.0
     grab_px: float = 8.0
@@ -131,6 +134,8 @@ class Gizmo:
             return False
         if self._drag:
             return part == self._drag.part
+        if self.is_muted:
+            return False
         if part.lock is Lock.VIEW or part.act is Act.ROTATE:
             return True
         toward = abs(self.axes[:, part.axis] @ line_of_sight(projection, self.frame[:3, 3]))

@@ -35,6 +35,23 @@ def test_a_click_pins(hand):
     assert len(hand.scene.edit.pins) == 1 and not hand.scene.edit.handles
 
 
+def test_the_gizmo_of_the_last_handle_leaves_the_click_to_the_pin_tool(hand):
+    handle = hand.placed()
+    viewport = hand.viewport
+    middle = viewport.projection.pixel(viewport.gizmo.frame[:3, 3])
+    # On a part of the gizmo, with surface behind it, and beside the handle's mark.
+    ring = [middle + r * np.array((np.cos(a), np.sin(a))) for r in (20, 30, 40, 60, 80) for a in np.linspace(0, 6, 60)]
+    at = next(xy for xy in ring if viewport.gizmo_part(*xy) is not None and viewport.pick(*xy) is not None)
+    hand.tools.choose("pin")
+    hand.click(at)
+    assert len(hand.scene.edit.pins) == 1 and hand.scene.edit.handle(handle.handle_id).pose.is_identity
+    assert hand.key("G") and viewport.gizmo.dragged == DOT, "keys still move the handle"
+    hand.key("Esc")
+    hand.tools.choose("handle")
+    assert viewport.gizmo_part(*at) is not None
+    hand.settle()
+
+
 @pytest.mark.parametrize(("how", "factor"), [("]", 1.15), ("[", 1 / 1.15), ("wheel", 1.15)])
 def test_the_reach_follows_keys_and_the_wheel_with_ctrl(hand, how, factor):
     held = hand.context.held(HandleOptions)

@@ -155,6 +155,12 @@ def test_holding_the_key_shows_the_original(driver):
     assert splats.compare.value == "deformed"
 
 
+def test_the_choice_of_a_method_says_what_an_artist_calls_it(driver):
+    method = driver.window.deformer_panel.method
+    tips = [method.itemData(index, Qt.ItemDataRole.ToolTipRole) for index in range(method.count())]
+    assert all(tips) and "keeps shape" in tips[method.findData("arap")]
+
+
 def cut_labels(window):
     """Texts of which a line is not seen."""
     labels = [label for label in window.dock.findChildren(QLabel) if label.isVisible() and label.wordWrap()]

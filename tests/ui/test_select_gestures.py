@@ -87,6 +87,18 @@ def test_a_selection_becomes_a_handle_or_a_pin(driver, key, n_handles, n_pins):
     driver.wait_idle()
 
 
+def test_everything_else_is_pinned_in_one_action(driver):
+    driver.key(Qt.Key.Key_Q)
+    driver.drag(*corners(driver, 20))
+    others = np.flatnonzero(~driver.scene.selection)
+    driver.key(Qt.Key.Key_P, Qt.KeyboardModifier.ShiftModifier)
+    (pin,) = driver.scene.edit.pins
+    np.testing.assert_array_equal(pin.rows, others)
+    driver.session.history.undo()
+    assert not driver.scene.edit.pins
+    driver.wait_idle()
+
+
 def test_escape_during_a_lasso_keeps_the_selection(driver):
     driver.key(Qt.Key.Key_K)
     outline = around(*corners(driver, 30))

@@ -140,7 +140,14 @@ def test_the_panel_says_how_good_the_weights_are_and_what_they_do_not_reach(driv
     placed(driver)
     lines = driver.window.deformer_panel.weights.lines
     assert len(lines) == 2
-    assert all("factorisation" in line and "KKT residual" in line and "bounds met" in line for line in lines)
+    assert all(" pulls " in line and "KKT" not in line for line in lines)
+    panel = driver.window.deformer_panel
+    figures = panel.figures.text().splitlines()
+    assert len(figures) == 2
+    assert all("factorisation" in line and "KKT residual" in line and "bounds met" in line for line in figures)
+    assert panel.details.body.isHidden(), "told to those who ask"
+    panel.details.header.click()
+    assert panel.figures.isVisible() and panel.timing.text().startswith("Drawing: ")
     row = int(driver.scene.ellipses.rows[0])
     driver.session.add_handle(rows_region(driver.scene, disc_rows(driver.scene, row, 0.0)))
     driver.window.handles_panel.cage_form.radius.setValue(1e-6)

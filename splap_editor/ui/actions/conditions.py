@@ -55,6 +55,11 @@ def has_selection(state: State) -> bool:
     return state.scene is not None and bool(state.scene.selection.any())
 
 
+def has_rest(state: State) -> bool:
+    """Splats are selected, and others are not."""
+    return has_selection(state) and not state.scene.selection.all()
+
+
 def has_selection_on_surface(state: State) -> bool:
     """Splats are selected, and their neighbours known."""
     return has_surface(state) and has_selection(state)

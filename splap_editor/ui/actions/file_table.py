@@ -68,7 +68,7 @@ FILE_TABLE: tuple[ActionSpec, ...] = (
         "file.save_edit",
         FileActions.save_edit,
         "Save ed&it…",
-        tip="Write handles, pins and options as a recipe.",
+        tip="Write handles, pins and options, for another file or the terminal.",
         needs=has_handles,
         menu="&File",
     ),

@@ -25,6 +25,11 @@ class HandleActions:
         """Hold the selected splats where they are."""
         self._session.add_pin(self._selected_region())
 
+    def pin_rest(self) -> None:
+        """Hold all that is not selected, as one pin; of what handles hold, these stay the masters."""
+        scene = self._session.scene
+        self._session.add_pin(rows_region(scene, np.flatnonzero(~scene.selection)))
+
     def clear_pins(self) -> None:
         """Let go of all pins."""
         self._session.change_edit(replace(self._session.scene.edit, pins=()), "Clear pins")

@@ -2,18 +2,19 @@
 
 from dataclasses import replace
 
-import numpy as np
-from PySide6.QtCore import QEvent, QObject, Signal
+from PySide6.QtCore import QEvent, QObject, Qt, Signal
 from PySide6.QtWidgets import QCheckBox, QGridLayout, QVBoxLayout, QWidget
 
 from splap_editor.core.adaptation.options import AdaptationOptions
-from splap_editor.core.deformers import DEFORMERS, method_titles
+from splap_editor.core.deformers import DEFORMERS, method_tips, method_titles
 from splap_editor.core.options import options_of, world_length
 from splap_editor.core.reach_options import ReachOptions
 from splap_editor.engine.edit import Edit
 from splap_editor.session.scene import Scene
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
+from splap_editor.session.weight_report import weight_figures
+from splap_editor.ui.panels.details import Details
 from splap_editor.ui.panels.weights_form import WeightsForm
 from splap_editor.ui.theme import STEP
 from splap_editor.ui.widgets.choices import Choice
@@ -38,9 +39,13 @@ class DeformerPanel(QWidget):
         self.state = PlainLabel(wordWrap=True)
         self.timing = PlainLabel()
         self.timing.setProperty("tone", "quiet")
+        self.figures = PlainLabel(wordWrap=True, textInteractionFlags=Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.figures.setProperty("tone", "quiet")
+        self.details = Details(self.timing, self.figures)
         self.method = Choice()
         for name, words in method_titles().items():
             self.method.addItem(words, name)
+            self.method.setItemData(self.method.count() - 1, method_tips()[name], Qt.ItemDataRole.ToolTipRole)
         self.method.currentIndexChanged.connect(
             lambda index: self._change("Change method", method=self.method.itemData(index))
         )
@@ -65,11 +70,12 @@ class DeformerPanel(QWidget):
         reach.addWidget(self.whole, 1, 0, 1, 2)
         layout = QVBoxLayout(self)
         layout.setSpacing(2 * STEP)
-        for part in (self.state, self.timing, self.method, *self.forms.values()):
+        for part in (self.state, self.method, *self.forms.values()):
             layout.addWidget(part)
         layout.addLayout(reach)
         layout.addWidget(self.kernels)
         layout.addWidget(self.weights)
+        layout.addWidget(self.details)
         SceneFollower(session, self._on_scene_changed, edit_changed=self._show, pose_changed=self.show_state)
         session.state_changed.connect(self.show_state)
         self._show()
@@ -85,19 +91,30 @@ class DeformerPanel(QWidget):
 
     def show_timing(self, draw_ms: float) -> None:
         """Show how long the last frame took to draw."""
-        self.timing.setText(f"A frame takes {draw_ms:.0f} ms")
+        self.timing.setText(f"Drawing: {draw_ms:.0f} ms")
 
     def show_state(self) -> None:
         """Say what the solver does."""
         words, tone = self._words()
         self.state.setText(words)
         set_tone(self.state, tone)
+        self.figures.setText("\n".join(self._figures()))
+        self.figures.setVisible(bool(self.figures.text()))
+
+    def _figures(self) -> list[str]:
+        """What the words stand for, in numbers."""
+        bound, scene = self._session.bound, self._scene
+        if bound is None:
+            return []
+        if bound.edit.deformer.has_weights:
+            return weight_figures(bound.edit, bound.deformer.report)
+        deformation = scene.deformation if scene is not None else None
+        if deformation is None or not deformation.n_iterations:
+            return []
+        residual = f", {100 * deformation.residual:.2g} % of the size to go" if deformation.residual > 0 else ""
+        return [f"Solver: {deformation.n_iterations} iterations{residual}"]
 
     def _words(self) -> tuple[str, str]:
-        scene = self._scene
-        deformation = scene.deformation if scene is not None else None
-        residual = deformation.residual if deformation is not None else 0.0
-        share = f": {100 * residual:.2g} % of the size to go" if np.isfinite(residual) and residual > 0 else ""
         return {
             "empty": ("Nothing is open.", "quiet"),
             "opening": ("Opening the file.", "quiet"),
@@ -105,16 +122,11 @@ class DeformerPanel(QWidget):
             "ready": ("At rest: no handle is placed.", "quiet"),
             "binding": ("Getting ready to bend.", ""),
             "dragging": ("Following the drag.", ""),
-            "settling": (f"Settling{share}.", ""),
-            "settled": (f"Settled{self._steps(deformation)}.", ""),
+            "settling": ("Settling.", ""),
+            "settled": ("Settled.", ""),
             "halted": ("Stopped; the picture may lag behind the handles.", "warning"),
             "failed": ("This edit could not be computed; undo it or try again.", "danger"),
         }[self._session.state]
-
-    @staticmethod
-    def _steps(deformation) -> str:
-        n = deformation.n_iterations if deformation is not None else 0
-        return f" in {n} step{'s' if n != 1 else ''}" if n else ""
 
     def _on_scene_changed(self) -> None:
         self._scene = self._session.scene
