@@ -9,6 +9,7 @@ from splap_editor.core.graph.options import GraphOptions
 from splap_editor.core.handle_nodes import Region
 from splap_editor.core.options import OptionSet
 from splap_editor.core.reach_options import ReachOptions
+from splap_editor.core.splats.contributions import contributions
 from splap_editor.core.splats.spherical_harmonics import view_colors
 from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.bound_edit import bind, ready_for_drags
@@ -32,6 +33,7 @@ def call_every_loop() -> None:
         # A drag that goes on from a settled pose takes another path.
         bound.drag(edit)
     adapted_splats(splats, kernels)
+    contributions(splats, surface.ellipses)
     normal_offsets(surface.ellipses, surface.graph.edges[:4])
     _look(splats)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     # Those bring the compiler with them, which the command line shall not wait for to list its columns.
     from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
     from splap_editor.core.deformer import Handles
+    from splap_editor.core.splats.contributions import Contributions
     from splap_editor.engine.surface import Surface
 
 
@@ -127,6 +129,33 @@ def flatness(snapshot: Snapshot) -> NDArray[np.float64]:
         return np.exp(logs[:, 0] - logs[:, 1])
 
 
+def contribution(snapshot: Snapshot) -> NDArray[np.float64]:
+    """What the splat contributes to pictures from all around, in units of the mean of all active splats.
+
+    0 for inert splats and those far beyond the subject, see `splap_editor.core.splats.contributions`.
+    """
+    weights = contributions_of(snapshot).weights
+    values = np.zeros(snapshot.splats.n_splats)
+    total = weights.sum()
+    if total > 0.0:
+        values[snapshot.ellipses.rows] = weights * (len(weights) / total)
+    return values
+
+
+def contributions_of(snapshot: Snapshot) -> Contributions:
+    """What the active splats contribute, made once per scene: no pose changes it."""
+    from splap_editor.core.splats.contributions import contributions
+
+    known = _CONTRIBUTIONS.get(snapshot.ellipses)
+    if known is None:
+        known = _CONTRIBUTIONS[snapshot.ellipses] = contributions(snapshot.splats, snapshot.ellipses)
+    return known
+
+
+_CONTRIBUTIONS: WeakKeyDictionary[Ellipses, Contributions] = WeakKeyDictionary()
+"""Of the scenes that are open."""
+
+
 def degree(snapshot: Snapshot) -> NDArray[np.float64]:
     """Number of graph neighbours; NaN for inert splats."""
     return _of_nodes(snapshot.ellipses, snapshot.surface.graph.degrees)
@@ -232,6 +261,7 @@ QUANTITIES: dict[str, Quantity] = {
         Quantity("alpha", "Opacity", "", opacity),
         Quantity("size", "Size", "length", size),
         Quantity("flatness", "Flatness", "", flatness),
+        Quantity("contribution", "Contribution to the picture", "×", contribution),
         Quantity("degree", "Degree", "", degree, "surface", is_whole=True),
         Quantity("component", "Component", "", component, "surface", is_whole=True, is_label=True),
         Quantity("geodesic", "Distance along the surface", "length", geodesic_distance, "picked"),
