@@ -31,7 +31,7 @@ class DeformerRow:
     has_free_radius : bool
         What lies farther from every handle than the free radius stays put.
     has_weights : bool
-        It has a weight for each handle, which its cage bounds: `weights`, `sparse_weights` and `report`.
+        It has a weight for each handle, which its cage bounds: it is a `core/bbw/bbw.py:WeightedDeformer`.
     named : tuple of str
         Modules that the one that binds imports by names out of a table: source of what it makes.
     ready : str

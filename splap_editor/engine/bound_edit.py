@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels, adapt_kernels, adapted_splats
 from splap_editor.core.adaptation.options import AdaptationOptions
-from splap_editor.core.binding import Binding, made_anew
+from splap_editor.core.binding import Binding, Keep, made_anew
 from splap_editor.core.deformer import Deformation, Deformer, Handles
 from splap_editor.core.deformers import DEFORMERS
 from splap_editor.core.handle_nodes import handle_nodes
@@ -27,6 +28,9 @@ from splap_editor.engine.sources import source_hash
 from splap_editor.engine.surface import Surface, surface_of
 from splap_editor.io.ply import SplatFile
 from splap_editor.io.recipe import Recipe
+
+if TYPE_CHECKING:
+    from splap_editor.core.bbw.bbw import WeightedDeformer
 
 T = TypeVar("T")
 
@@ -60,13 +64,20 @@ class Posed:
 
     @property
     def snapshot(self) -> Snapshot:
-        """What quantities are worked out from; the weight asked for is that of the only handle."""
+        """What quantities are worked out from; the weight asked for is that of the only handle.
+
+        Raises
+        ------
+        ValueError
+            There is no surface.
+        """
         handles = weights = handle = None
         if self.bound is not None:
             handles, weights = self.bound.handles, self.bound.weights
             handle = 0 if len(self.bound.edit.active_handles) == 1 else None
-        ellipses = self.surface.ellipses if self.surface is not None else None
-        return Snapshot(self.rest, ellipses, self.surface, self.kernels, handles, weights, handle)
+        if self.surface is None:
+            raise ValueError("columns need the surface of the scene: pose it with with_surface=True")
+        return Snapshot(self.rest, self.surface.ellipses, self.surface, self.kernels, handles, weights, handle)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,9 +98,14 @@ class BoundEdit:
     deformer: Deformer
 
     @property
-    def weights(self) -> object:
+    def weights(self) -> NDArray[np.float64] | None:
         """(n, H) handle weights, None where the deformer has none."""
-        return self.deformer.weights if self.edit.deformer.has_weights else None
+        return None if self.weighted is None else self.weighted.weights
+
+    @property
+    def weighted(self) -> WeightedDeformer | None:
+        """The deformer, where it has a weight for each handle."""
+        return cast("WeightedDeformer", self.deformer) if self.edit.deformer.has_weights else None
 
     def pose(
         self,
@@ -230,7 +246,7 @@ def _arrays(handles: Handles) -> tuple[object, ...]:
     return handles.indices, handles.labels, handles.centers, handles.cage_radii
 
 
-def _kept_in(cache: StageCache, made_from: tuple[object, ...]):
+def _kept_in(cache: StageCache, made_from: tuple[object, ...]) -> Keep:
     """Keep results under the hash of what they are made from."""
 
     def keep(name: object, make: Callable[[], T], packed: Callable[[T], Arrays], unpacked: Callable[[Arrays], T]) -> T:

@@ -8,7 +8,7 @@ import tempfile
 import zlib
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import BinaryIO, TypeVar
+from typing import Any, BinaryIO, TypeVar
 
 import numpy as np
 import platformdirs
@@ -95,7 +95,9 @@ class StageCache:
             try:
                 with os.fdopen(handle, "w+b") as file:
                     file.write(bytes(_HEAD.size))
-                    np.savez(file, **arrays)
+                    # Newer numpy has a parameter among the names of arrays, which none of ours is.
+                    named: dict[str, Any] = arrays
+                    np.savez(file, **named)
                     head = _HEAD.pack(_MAGIC, *_length_and_sum(file))
                     file.seek(0)
                     file.write(head)
@@ -184,7 +186,7 @@ def content_key(parts: Iterable[object]) -> str:
     for part in parts:
         if isinstance(part, np.ndarray):
             digest.update(f"{part.dtype.str}{part.shape}".encode())
-            digest.update(np.ascontiguousarray(part))
+            digest.update(np.ascontiguousarray(part).data)
         else:
             digest.update(repr(part).encode())
         digest.update(b"\0")

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels, adapted_splats
-from splap_editor.core.progress import Progress, Runner, in_turn, no_progress
+from splap_editor.core.progress import Progress, Runner, in_turn, no_progress, part_of
 from splap_editor.engine.bound_edit import BoundEdit, bind
 from splap_editor.engine.cache import StageCache
 from splap_editor.engine.edit import Edit
@@ -48,6 +48,8 @@ def frame_poser(
     """Bind the deformer of an edit; ``surface`` is needed where it has an enabled handle."""
     if not edit.active_handles:
         return FramePoser(edit, None)
+    if surface is None:
+        raise ValueError("an edit with an enabled handle needs the surface of the scene")
     return FramePoser(edit, bind(surface, edit, cache=cache, progress=progress, run=run))
 
 
@@ -142,9 +144,6 @@ def write_pictures(
 
 
 def _posed(poser: FramePoser, frames: range, progress: Progress) -> Iterable[tuple[int, AdaptedKernels | None]]:
+    n = len(frames)
     for done, frame in enumerate(frames):
-        start = done / len(frames)
-        yield (
-            done,
-            poser.kernels(frame, progress=lambda share, start=start: progress(start + 0.9 * share / len(frames))),
-        )
+        yield done, poser.kernels(frame, progress=part_of(progress, done / n, (done + 0.9) / n))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -15,10 +15,15 @@ from splap_editor.core.splats.splats import Splats
 
 if TYPE_CHECKING:
     # Those bring the compiler with them, which the command line shall not wait for to list its columns.
+    import scipy.sparse as sp
+
     from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
     from splap_editor.core.deformer import Handles
     from splap_editor.core.splats.contributions import Contributions
     from splap_editor.engine.surface import Surface
+
+    Weights: TypeAlias = NDArray[np.float64] | sp.csr_array
+    """(n, H) handle weights."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +54,7 @@ class Snapshot:
     surface: Surface | None = None
     kernels: AdaptedKernels | None = None
     handles: Handles | None = None
-    weights: object = None
+    weights: Weights | None = None
     handle: int | None = None
     picked: int | None = None
 
@@ -158,11 +163,13 @@ _CONTRIBUTIONS: WeakKeyDictionary[Ellipses, Contributions] = WeakKeyDictionary()
 
 def degree(snapshot: Snapshot) -> NDArray[np.float64]:
     """Number of graph neighbours; NaN for inert splats."""
+    assert snapshot.surface is not None
     return _of_nodes(snapshot.ellipses, snapshot.surface.graph.degrees)
 
 
 def component(snapshot: Snapshot) -> NDArray[np.float64]:
     """Component of the graph, 0 the largest; NaN for inert splats."""
+    assert snapshot.surface is not None
     return _of_nodes(snapshot.ellipses, snapshot.surface.graph.components)
 
 
@@ -170,6 +177,7 @@ def geodesic_distance(snapshot: Snapshot) -> NDArray[np.float64]:
     """Length of the shortest path from the picked splat; NaN where none leads, everywhere if that splat is inert."""
     from splap_editor.core.surface.geodesics import geodesic_distances
 
+    assert snapshot.surface is not None and snapshot.picked is not None
     node = int(snapshot.ellipses.node_of_row[snapshot.picked])
     if node < 0:
         return np.full(snapshot.splats.n_splats, np.nan)
@@ -243,6 +251,7 @@ def rotation_angle(snapshot: Snapshot) -> NDArray[np.float64]:
 
 def free(snapshot: Snapshot) -> NDArray[np.float64]:
     """0 for what is pinned or out of reach, 1 for what a handle holds, 2 for what is free; NaN for inert splats."""
+    assert snapshot.handles is not None
     states = np.full(snapshot.ellipses.n_nodes, 2.0)
     states[snapshot.handles.indices] = snapshot.handles.labels >= 0
     return _of_nodes(snapshot.ellipses, states)
@@ -250,9 +259,10 @@ def free(snapshot: Snapshot) -> NDArray[np.float64]:
 
 def handle_weight(snapshot: Snapshot) -> NDArray[np.float64]:
     """Weight of the chosen handle in [0, 1]; NaN for inert splats."""
+    assert snapshot.weights is not None and snapshot.handle is not None
     column = snapshot.weights[:, [snapshot.handle]]
-    column = column.toarray() if hasattr(column, "toarray") else np.asarray(column)
-    return _of_nodes(snapshot.ellipses, column[:, 0])
+    dense = column if isinstance(column, np.ndarray) else column.toarray()
+    return _of_nodes(snapshot.ellipses, dense[:, 0])
 
 
 QUANTITIES: dict[str, Quantity] = {

@@ -6,6 +6,7 @@ from splap_editor.core.handle_nodes import Region
 from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.edit import HANDLE_COLORS, Edit, Handle
 from splap_editor.io.recipe import HandleSpec, PinSpec, Recipe, RecipeError
+from splap_editor.io.recipe_specs import Vector
 
 
 def recipe_of(edit: Edit, *, with_disabled: bool = False) -> Recipe:
@@ -26,7 +27,7 @@ def edit_of(recipe: Recipe, splats: Splats) -> Edit:
     Raises
     ------
     RecipeError
-        A row is not in the file.
+        A row is not in the file, or nothing says which splats a handle or a pin is of.
     """
     handles = tuple(
         Handle(
@@ -61,7 +62,7 @@ def _handle_spec(handle: Handle) -> HandleSpec:
     )
 
 
-def _place(region: Region) -> tuple[tuple[float, ...], float | None, tuple[int, ...] | None]:
+def _place(region: Region) -> tuple[Vector, float | None, tuple[int, ...] | None]:
     center = tuple(np.asarray(region.center, np.float64).tolist())
     if region.rows is None:
         return center, float(region.radius), None
@@ -70,6 +71,8 @@ def _place(region: Region) -> tuple[tuple[float, ...], float | None, tuple[int, 
 
 def _region(spec: HandleSpec | PinSpec, splats: Splats, name: str) -> Region:
     if spec.rows is None:
+        if spec.center is None or spec.radius is None:
+            raise RecipeError(f"{name} needs a center and a radius, or the rows of its splats")
         return Region(np.array(spec.center, np.float64), spec.radius)
     rows = np.array(spec.rows, np.int64)
     if rows.max(initial=-1) >= splats.n_splats:

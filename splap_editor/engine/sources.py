@@ -3,6 +3,8 @@
 import hashlib
 import re
 from functools import cache
+from importlib.abc import InspectLoader
+from importlib.machinery import ModuleSpec
 from importlib.util import find_spec
 
 _IMPORT = re.compile(
@@ -40,7 +42,7 @@ def _imported(module: str) -> frozenset[str]:
     found = set()
     for name, in_lines, in_line in _IMPORT.findall(_source(module)):
         found.add(name)
-        if find_spec(name).submodule_search_locations is not None:
+        if _spec(name).submodule_search_locations is not None:
             members = (member.split("#")[0].split(" as ")[0].strip() for member in (in_lines or in_line).split(","))
             found.update(f"{name}.{member}" for member in members if member and find_spec(f"{name}.{member}"))
     return frozenset(found)
@@ -49,4 +51,13 @@ def _imported(module: str) -> frozenset[str]:
 @cache
 def _source(module: str) -> str:
     """Text of a module, from its file or from an archive that holds it."""
-    return find_spec(module).loader.get_source(module) or ""
+    loader = _spec(module).loader
+    assert isinstance(loader, InspectLoader)
+    return loader.get_source(module) or ""
+
+
+def _spec(module: str) -> ModuleSpec:
+    spec = find_spec(module)
+    if spec is None:
+        raise ModuleNotFoundError(f"there is no module {module}", name=module)
+    return spec

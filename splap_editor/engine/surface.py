@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from time import perf_counter
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -54,7 +54,7 @@ class Surface:
     binding: KernelBinding
     key: str
     timings_s: dict[str, float] = field(default_factory=dict)
-    _shared: dict[Callable, object] = field(default_factory=dict, repr=False)
+    _shared: dict[Callable[["Surface"], Any], Any] = field(default_factory=dict, repr=False)
 
     @property
     def options(self) -> GraphOptions:
@@ -100,7 +100,8 @@ class Surface:
         """What all handle sets of the scene have in common, made by ``make(surface)`` when first asked for."""
         if make not in self._shared:
             self._shared[make] = make(self)
-        return self._shared[make]
+        made: T = self._shared[make]
+        return made
 
 
 def surface_of(

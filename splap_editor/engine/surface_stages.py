@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from splap_editor.core.graph.options import NEIGHBORHOODS, GraphOptions
 from splap_editor.core.graph.splat_graph import SplatGraph, mended_graph, splat_graph
+from splap_editor.core.index_spaces import Nodes
 from splap_editor.core.kept_arrays import Arrays, require_array, require_rows
 from splap_editor.core.options import loaded
 from splap_editor.core.progress import Progress, StageProgress
@@ -120,7 +121,7 @@ def mended_stages(
     return SurfaceStages(options, before.unmended, graph, neighborhoods, triangles, L, M, mends)
 
 
-def _changed_ends(ellipses: Ellipses, before: GraphOptions, after: GraphOptions) -> NDArray[np.int64]:
+def _changed_ends(ellipses: Ellipses, before: GraphOptions, after: GraphOptions) -> Nodes:
     """Nodes at the ends of the edges that only one of two options names."""
     pairs = (_pairs(before.cut) ^ _pairs(after.cut)) | (_pairs(before.add) ^ _pairs(after.add))
     return ellipses.node_of_row[np.array(sorted({row for pair in pairs for row in pair}), np.int64)]

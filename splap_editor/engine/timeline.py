@@ -124,7 +124,7 @@ def _pose_between(keys: list[tuple[int, Pose]], frame: float, center: NDArray[np
 
 def _scale_between(
     keys: list[tuple[int, Pose]], frames: NDArray[np.float64], frame: float, is_smooth: bool
-) -> float | tuple[float, ...]:
+) -> float | tuple[float, float, float]:
     is_uniform = not any(isinstance(pose.scale, tuple) for _, pose in keys)
     scales = np.array([np.broadcast_to(pose.scale, 1 if is_uniform else 3) for _, pose in keys], np.float64)
     scale = scale_curve(frames, scales, frame, is_smooth=is_smooth).tolist()

@@ -2,6 +2,7 @@
 
 import threading
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from time import monotonic
 
@@ -116,7 +117,7 @@ class Autosave:
                 self._tell_failure(error)
             else:
                 self._has_failed = False
-                self._post(lambda state=state: self.written.emit(state))
+                self._post(partial(self.written.emit, state))
             if is_last:
                 return
 

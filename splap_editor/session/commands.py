@@ -1,11 +1,12 @@
 """The undoable steps: each a swap between a value before and a value after."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.handle_nodes import Region
 from splap_editor.core.index_spaces import FileMask
 from splap_editor.engine.edit import Edit
 from splap_editor.session.scene import Scene
@@ -97,7 +98,7 @@ class ChangeSelectionSets:
         self._scene.set_selection_sets(self._before)
 
 
-def _regions(edit: Edit):
+def _regions(edit: Edit) -> Iterator[Region]:
     yield from edit.pins
     for handle in edit.handles:
         yield handle.region

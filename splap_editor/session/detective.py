@@ -42,10 +42,10 @@ def oddities(splats: Splats, ellipses: Ellipses) -> list[Oddity]:
         (InertReason.TRANSPARENT, "too faint to shape the surface"),
         (InertReason.ZERO_SIZE, "without any size"),
     ):
-        rows = np.flatnonzero(ellipses.inert == reason)
-        if len(rows):
-            share = 100 * len(rows) / splats.n_splats
-            found.append(Oddity(f"{_splats(len(rows))} {words} ({share:.2g} % of all).", rows))
+        inert = np.flatnonzero(ellipses.inert == reason)
+        if len(inert):
+            share = 100 * len(inert) / splats.n_splats
+            found.append(Oddity(f"{_splats(len(inert))} {words} ({share:.2g} % of all).", inert))
     rows = round_rows(splats)
     if len(rows):
         found.append(Oddity(f"{_splats(len(rows))} nearly round: which way they face is a guess.", rows))

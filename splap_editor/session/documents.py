@@ -110,14 +110,17 @@ class Documents:
 
     def state(self) -> SavedState | None:
         """All that a session file would keep of the scene as it is; None without a scene."""
-        return saved_state(self._session.scene, self.look()) if self._session.scene is not None else None
+        return self._state() if self._session.scene is not None else None
+
+    def _state(self) -> SavedState:
+        return saved_state(self._session.shown_scene, self.look())
 
     @property
     def is_dirty(self) -> bool:
         """Whether the scene holds something that no session file has."""
         if self._session.scene is None:
             return False
-        return self._kept is None or not self._kept.keeps_like(self.state())
+        return self._kept is None or not self._kept.keeps_like(self._state())
 
     @property
     def would_lose(self) -> bool:
@@ -127,7 +130,7 @@ class Documents:
         """
         if not self.is_dirty:
             return False
-        return self._session.has_unexported_work or bool(self._session.scene.edit.timeline.keys)
+        return self._session.has_unexported_work or bool(self._session.shown_scene.edit.timeline.keys)
 
     def file_of(self, state: SavedState, folder: Path | None) -> SessionFile:
         """Session file of a state, with the hash of the PLY as far as it is known."""
@@ -176,7 +179,7 @@ class Documents:
         self._reading.ask(located, done, failed=failed, title=title)
 
     def _on_scene_changed(self) -> None:
-        scene = self._session.scene
+        scene = self._session.shown_scene
         arrival, self._arrival = self._arrival, None
         self._source = source = _Source(scene.file.path)
         self._hashing.ask(lambda job: _take_digest(source), lambda done: None)
@@ -203,7 +206,7 @@ class Documents:
         path = path or self.path
         if path is None:
             raise ValueError("the scene has no session file yet: give one")
-        state, scene, source = self.state(), self._session.scene, self._source
+        state, scene, source = self._state(), self._session.shown_scene, self._source
 
         def write(job: Job) -> None:
             try:

@@ -5,6 +5,7 @@ import traceback
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from time import monotonic
 from typing import Any
 
@@ -145,13 +146,13 @@ class Worker:
                 if self._closing:
                     return
                 job = self._running = self._queue.popleft()
-            self.post(lambda job=job: self.on_busy(job))
+            self.post(partial(self._tell_busy, job))
             self._run_one(job)
             with self._wake:
                 self._running = None
                 idle = not self._queue
             if idle:
-                self.post(lambda: self.on_busy(None))
+                self.post(partial(self._tell_busy, None))
 
     def _run_one(self, job: Job) -> None:
         try:
@@ -165,9 +166,12 @@ class Worker:
             if not isinstance(error, (ValueError, OSError, MemoryError)):
                 traceback.print_exc()
             if job.failed is not None:
-                self.post(lambda error=error: job.failed(error))
+                self.post(partial(job.failed, error))
         else:
             self.post(lambda: self._finish(job, value))
+
+    def _tell_busy(self, job: Job | None) -> None:
+        self.on_busy(job)
 
     @staticmethod
     def _finish(job: Job, value: Any) -> None:

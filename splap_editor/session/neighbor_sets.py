@@ -86,9 +86,9 @@ def neighbor_set(
         near = graph.indices[entries].astype(np.int64)
         return near[np.argsort(graph.lengths[entries], kind="stable")]
     if kind == "geodesic":
-        near = neighborhoods.indices[neighborhoods.indptr[node] : neighborhoods.indptr[node + 1]]
-        if len(near) >= k:
-            return near[:k].astype(np.int64)
+        settled = neighborhoods.indices[neighborhoods.indptr[node] : neighborhoods.indptr[node + 1]]
+        if len(settled) >= k:
+            return settled[:k].astype(np.int64)
         return _nearest(geodesic_distances(graph, np.array([node])), node, k)
     steps = ellipses.centers - ellipses.centers[node]
     if kind == "euclidean":

@@ -5,9 +5,9 @@ import numpy as np
 from splap_editor.core.arap.rotation_fit import fit_rotations
 from splap_editor.core.handle_nodes import Region
 from splap_editor.core.index_spaces import FileRow, FileRows
+from splap_editor.core.pose import Pose
 from splap_editor.core.splats.rotations import matrices_to_quats
 from splap_editor.core.surface.geodesics import geodesic_distances
-from splap_editor.engine.edit import Pose
 from splap_editor.session.scene import Scene
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from splap_editor.core.index_spaces import FileMask
+from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.edit import Edit
 from splap_editor.engine.recipe_edit import edit_of, recipe_of
 from splap_editor.engine.timeline import Key, Timeline
@@ -92,7 +93,7 @@ def session_file_of(state: SavedState, folder: Path | None, content_hash: str) -
     )
 
 
-def session_edit(session: SessionFile, splats) -> Edit:
+def session_edit(session: SessionFile, splats: Splats) -> Edit:
     """Make the edit of a session file.
 
     Parameters

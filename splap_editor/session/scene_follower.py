@@ -26,8 +26,12 @@ class SceneHandlers(TypedDict, total=False):
 class ShowsScene(Protocol):
     """What can be followed: one scene at a time, and a signal for another."""
 
-    scene: Scene | None
     scene_changed: Signal
+
+    @property
+    def scene(self) -> Scene | None:
+        """The scene on screen."""
+        ...
 
 
 class SceneFollower:

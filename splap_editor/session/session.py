@@ -9,12 +9,13 @@ import numpy as np
 
 from splap_editor.core.handle_nodes import Region
 from splap_editor.core.index_spaces import FileMask
+from splap_editor.core.pose import Pose
+from splap_editor.engine.bound_edit import BoundEdit
 from splap_editor.engine.cache import StageCache
-from splap_editor.engine.edit import HANDLE_COLORS, Edit, Handle, Pose
+from splap_editor.engine.edit import HANDLE_COLORS, Edit, Handle
 from splap_editor.engine.keyframes import auto_keyed_edit
 from splap_editor.engine.recipe_edit import edit_of, recipe_of
 from splap_editor.io.recipe import read_recipe, write_recipe
-from splap_editor.session.bound_edit import BoundEdit
 from splap_editor.session.commands import ChangeEdit, ChangeMask
 from splap_editor.session.depictor import Depictor, Unseen
 from splap_editor.session.history import History
@@ -80,6 +81,11 @@ class Session:
         return self._ledger.scene
 
     @property
+    def shown_scene(self) -> Scene:
+        """The scene on screen, for what is offered only while there is one; RuntimeError without."""
+        return self._ledger.shown_scene
+
+    @property
     def state(self) -> str:
         """One of empty, opening, preparing, ready, binding, dragging, settling, settled, halted and failed."""
         return self._ledger.state
@@ -136,28 +142,28 @@ class Session:
 
     def save_edit(self, path: Path) -> None:
         """Write the edit as a recipe for ``splap-editor deform``."""
-        write_recipe(path, recipe_of(self._scene().edit))
+        write_recipe(path, recipe_of(self.shown_scene.edit))
 
     def open_edit(self, path: Path) -> None:
         """Replace the edit by a recipe's, as one undoable step."""
-        self.change_edit(edit_of(read_recipe(path), self._scene().splats), "Open edit")
+        self.change_edit(edit_of(read_recipe(path), self.shown_scene.splats), "Open edit")
 
     # ------------------------------------------------------------------ edits
 
     def change_edit(self, edit: Edit, label: str) -> None:
         """Replace the edit as one undoable step."""
-        scene = self._scene()
+        scene = self.shown_scene
         self.history.push(ChangeEdit(scene, scene.edit, auto_keyed_edit(scene.edit, edit), label))
 
     def change_mask(self, name: str, mask: FileMask, label: str) -> None:
         """Replace ``"selection"`` or ``"hidden"``, (N,) of file rows, as one undoable step; none if nothing changes."""
-        scene = self._scene()
+        scene = self.shown_scene
         if not np.array_equal(getattr(scene, name), mask):
             self.history.push(ChangeMask(scene, name, mask, label))
 
     def add_handle(self, region: Region, *, pose: Pose | None = None, name: str | None = None) -> Handle:
         """Place a handle, make it the active one, and prepare to move it."""
-        scene = self._scene()
+        scene = self.shown_scene
         handle_id = scene.edit.next_handle_id()
         color = HANDLE_COLORS[(handle_id - 1) % len(HANDLE_COLORS)]
         handle = Handle(handle_id, name or f"Handle {handle_id}", color, region, pose or Pose())
@@ -168,7 +174,7 @@ class Session:
 
     def add_pin(self, region: Region) -> None:
         """Hold splats where they are."""
-        edit = self._scene().edit
+        edit = self.shown_scene.edit
         self.change_edit(replace(edit, pins=(*edit.pins, region)), "Place pin")
 
     # ------------------------------------------------------------------ a drag
@@ -186,19 +192,19 @@ class Session:
 
     def preview_poses(self, poses: Mapping[int, Pose]) -> None:
         """Show handles at poses that are not in the history yet; the newest request wins."""
-        scene = self._scene()
+        scene = self.shown_scene
         scene.set_preview(scene.edit.with_poses(dict(poses)))
 
     def commit_preview(self, label: str) -> None:
         """Make the previewed poses one undoable step, and settle."""
-        scene = self._scene()
+        scene = self.shown_scene
         if scene.preview is not None:
             self.change_edit(scene.preview, label)
 
     def cancel_preview(self) -> None:
         """Go back to the poses from before the drag; a step that waits is not taken."""
         self._frames.forget()
-        scene = self._scene()
+        scene = self.shown_scene
         if scene.preview is not None:
             scene.set_preview(None)
 
@@ -254,8 +260,3 @@ class Session:
             self.scene_changed.emit()
         elif stage == "export":
             self.exported.emit(value)
-
-    def _scene(self) -> Scene:
-        if self.scene is None:
-            raise RuntimeError("no scene is open")
-        return self.scene

@@ -81,8 +81,10 @@ class StageRunner:
 
     def _start(self, stage: Stage, request: Any) -> None:
         self._cancel(stage)
+        make = stage.make
+        assert make is not None  # else it has no loop
         self._loops[stage.name].ask(
-            lambda job: stage.make(job, request),
+            lambda job: make(job, request),
             partial(self._take, stage, request),
             failed=partial(self._fail, stage, request),
             title=stage.title(request) if stage.is_told else "",

@@ -4,11 +4,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+from splap_editor.engine.bound_edit import BoundEdit
 from splap_editor.engine.cache import StageCache
 from splap_editor.engine.edit import Edit, binds_like, poses_like
 from splap_editor.engine.export_report import ExportReport
 from splap_editor.engine.surface import Surface
-from splap_editor.session.bound_edit import BoundEdit, snapshot_of
+from splap_editor.session.bound_edit import snapshot_of
 from splap_editor.session.depictor import Depictor, Unseen
 from splap_editor.session.jobs import Job
 from splap_editor.session.scene import Scene
@@ -79,38 +80,46 @@ class Ledger:
     state: str = "empty"
 
     @property
+    def shown_scene(self) -> Scene:
+        """The scene on screen, for who asks only while there is one; RuntimeError without."""
+        if self.scene is None:
+            raise RuntimeError("no scene is open")
+        return self.scene
+
+    @property
     def is_dragging(self) -> bool:
         """Whether an edit is on screen that is not in the history yet."""
-        return self.scene.preview is not None
+        return self.shown_scene.preview is not None
 
     @property
     def is_posed(self) -> bool:
         """Whether the kernels on screen are those of the edit on screen: settled, or the newest frame of a drag."""
-        posed, edit = self.posed, self.scene.shown_edit
-        is_far_enough = posed is not None and (posed.is_settled or self.is_dragging)
-        return is_far_enough and binds_like(posed.edit, edit) and poses_like(posed.edit, edit)
+        posed, edit = self.posed, self.shown_scene.shown_edit
+        if posed is None or not (posed.is_settled or self.is_dragging):
+            return False
+        return binds_like(posed.edit, edit) and poses_like(posed.edit, edit)
 
     @property
     def has_unexported_edit(self) -> bool:
         """Whether the edit differs from the one last exported (or from the file's own pose)."""
         exported = self.exported or Edit()
-        return not self._is_exported and not (self.scene.edit.is_identity and exported.is_identity)
+        return not self._is_exported and not (self.shown_scene.edit.is_identity and exported.is_identity)
 
     @property
     def has_unexported_work(self) -> bool:
         """Whether there are handles or pins that no export had, moved or not, or such an edit."""
-        edit = self.scene.edit
+        edit = self.shown_scene.edit
         return self.has_unexported_edit or (not self._is_exported and bool(edit.handles or edit.pins))
 
     @property
     def _is_exported(self) -> bool:
-        edit, exported = self.scene.edit, self.exported or Edit()
+        edit, exported = self.shown_scene.edit, self.exported or Edit()
         return binds_like(edit, exported) and poses_like(edit, exported)
 
     @property
     def state_at_rest(self) -> str:
         """What to say once nothing is left to be made."""
-        if not self.scene.shown_edit.active_handles:
+        if not self.shown_scene.shown_edit.active_handles:
             return "ready"
         return "dragging" if self.is_dragging else "settled"
 
@@ -168,16 +177,19 @@ class Stage:
 
 
 def _surface_request(ledger: Ledger) -> SurfaceRequest:
-    scene = ledger.scene
+    scene = ledger.shown_scene
     return SurfaceRequest(scene, scene.surface, scene.shown_edit.graph, ledger.cache)
 
 
 def _bind_request(ledger: Ledger) -> BindRequest:
-    return BindRequest(ledger.scene.surface, ledger.scene.shown_edit, ledger.cache, ledger.n_threads)
+    scene = ledger.shown_scene
+    assert scene.surface is not None  # else it is prepared first
+    return BindRequest(scene.surface, scene.shown_edit, ledger.cache, ledger.n_threads)
 
 
 def _pose_request(ledger: Ledger) -> PoseRequest:
-    scene = ledger.scene
+    scene = ledger.shown_scene
+    assert scene.surface is not None and ledger.bound is not None  # else they are made first
     return PoseRequest(
         scene.surface,
         ledger.bound,
@@ -188,7 +200,7 @@ def _pose_request(ledger: Ledger) -> PoseRequest:
 
 
 def _export_request(ledger: Ledger) -> ExportRequest:
-    scene = ledger.scene
+    scene = ledger.shown_scene
     snapshot = snapshot_of(scene, ledger.bound)
     return ExportRequest(ledger.exports[0], scene, scene.edit, scene.file, scene.kernels, snapshot)
 
@@ -215,7 +227,7 @@ def _take_bound(ledger: Ledger, request: BindRequest, bound: BoundEdit) -> None:
 
 def _take_pose(ledger: Ledger, request: PoseRequest, made: MadePose, *, is_settled: bool) -> None:
     ledger.posed = Posed(request.edit, is_settled)
-    _show_pose(ledger.scene, made)
+    _show_pose(ledger.shown_scene, made)
 
 
 def _show_pose(scene: Scene, made: MadePose) -> None:
@@ -225,8 +237,8 @@ def _show_pose(scene: Scene, made: MadePose) -> None:
 
 def _take_rest(ledger: Ledger, request: None, made: None) -> None:
     ledger.bound = ledger.posed = None
-    if ledger.scene.kernels is not None:
-        ledger.scene.set_pose(None)
+    if ledger.shown_scene.kernels is not None:
+        ledger.shown_scene.set_pose(None)
 
 
 def _take_export(ledger: Ledger, request: ExportRequest, report: ExportReport) -> None:
@@ -243,7 +255,7 @@ def _forget_file(ledger: Ledger, request: OpenRequest) -> None:
 
 
 def _give_up(ledger: Ledger, request: object) -> None:
-    ledger.given_up = ledger.scene.shown_edit
+    ledger.given_up = ledger.shown_scene.shown_edit
 
 
 def _forget_export(ledger: Ledger, request: ExportRequest) -> None:
@@ -251,7 +263,16 @@ def _forget_export(ledger: Ledger, request: ExportRequest) -> None:
 
 
 def _has_handles(ledger: Ledger) -> bool:
-    return bool(ledger.scene.shown_edit.active_handles)
+    return bool(ledger.shown_scene.shown_edit.active_handles)
+
+
+def _is_prepared(ledger: Ledger) -> bool:
+    scene = ledger.shown_scene
+    return scene.surface is not None and scene.surface.options == scene.shown_edit.graph
+
+
+def _is_bound(ledger: Ledger) -> bool:
+    return ledger.bound is not None and binds_like(ledger.bound.edit, ledger.shown_scene.shown_edit)
 
 
 def _pose_like(a: PoseRequest, b: PoseRequest) -> bool:
@@ -274,9 +295,7 @@ STAGES = (
     Stage(
         "prepare",
         needs=lambda ledger: True,
-        is_current=lambda ledger: (
-            ledger.scene.surface is not None and ledger.scene.surface.options == ledger.scene.shown_edit.graph
-        ),
+        is_current=_is_prepared,
         state=lambda ledger: "preparing",
         cancels=("bind", "pose", "drag"),
         request=_surface_request,
@@ -297,7 +316,9 @@ STAGES = (
     Stage(
         "bind",
         needs=_has_handles,
-        is_current=lambda ledger: ledger.bound is not None and binds_like(ledger.bound.edit, ledger.scene.shown_edit),
+        is_current=lambda ledger: (
+            ledger.bound is not None and binds_like(ledger.bound.edit, ledger.shown_scene.shown_edit)
+        ),
         state=lambda ledger: "binding",
         cancels=("pose", "drag"),
         request=_bind_request,

@@ -161,6 +161,8 @@ def settled_pose(job: Job, request: PoseRequest) -> MadePose:
 
 
 def _made_pose(request: PoseRequest, posed: Posed) -> MadePose:
+    # What a bound deformer poses has both.
+    assert posed.kernels is not None and posed.deformation is not None
     return MadePose(posed.kernels, posed.deformation, request.present(posed.kernels))
 
 

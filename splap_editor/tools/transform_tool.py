@@ -5,7 +5,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.engine.edit import Handle, Pose
+from splap_editor.core.pose import Pose
+from splap_editor.engine.edit import Handle
 from splap_editor.tools.bindings import Binding
 from splap_editor.tools.tool import KeyEvent, PointerEvent, Tool, ToolContext
 from splap_editor.viewport.gizmo import DOT, SCALE_BOX, VIEW_RING, Act, Lock, Part

@@ -16,13 +16,16 @@ from splap_editor.core.reach_options import ReachOptions
 from splap_editor.core.splats.rotations import quats_to_matrices
 from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.bound_edit import bind
+from splap_editor.engine.bound_edit import posed as posed_file
 from splap_editor.engine.cache import StageCache
 from splap_editor.engine.edit import Edit, Handle, Pose
 from splap_editor.engine.recipe_edit import edit_of, recipe_of
+from splap_editor.engine.scripting import write_posed
 from splap_editor.engine.surface import surface_of
 from splap_editor.engine.surface_stages import packed_stages
 from splap_editor.io.ply import read_ply
-from splap_editor.io.recipe import recipe_from_json, recipe_to_json
+from splap_editor.io.recipe import RecipeError, recipe_from_json, recipe_to_json
+from splap_editor.io.recipe_specs import HandleSpec, Recipe
 from splap_editor.resources import resource
 
 FREED = OptionSet(ReachOptions(None))
@@ -285,3 +288,16 @@ def test_a_handful_of_splats_can_be_moved(splats, n):
     handle = Handle(1, "one", "#ffffff", Region(surface.ellipses.centers[0], 1e-6), Pose((1.0, 0.0, 0.0)))
     kernels = posed(surface, few, Edit(handles=(handle,), options=FREED))
     np.testing.assert_allclose(kernels.means, np.asarray(few.means, float) + np.array([1.0, 0.0, 0.0]), atol=1e-6)
+
+
+@pytest.mark.parametrize("handle", [HandleSpec("head", center=(0.0, 0.0, 0.0)), HandleSpec("head", radius=1.0)])
+def test_a_handle_of_no_splats_is_refused(splats, handle):
+    with pytest.raises(RecipeError, match=r"handle 'head' needs a center and a radius, or the rows of its splats"):
+        edit_of(Recipe(handles=(handle,)), splats)
+
+
+def test_columns_without_a_surface_are_refused(tmp_path):
+    file = read_ply(resource("samples", "tube.ply"))
+    with pytest.raises(ValueError, match="columns need the surface of the scene"):
+        write_posed(tmp_path / "out.ply", file, posed_file(file, Edit()), columns=("size",))
+    write_posed(tmp_path / "out.ply", file, posed_file(file, Edit(), with_surface=True), columns=("size",))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -22,7 +22,7 @@ from splap_editor.core.bbw.weights import (
     bbw_problem,
     handle_weight,
 )
-from splap_editor.core.deformer import FREE, PIN, Deformation, Handles, Shown
+from splap_editor.core.deformer import FREE, PIN, Deformation, Deformer, Handles, Shown
 from splap_editor.core.progress import Progress, no_progress, part_of
 
 if TYPE_CHECKING:
@@ -115,6 +115,18 @@ def bbw_weights(
         n_resting=int((unconstrained & ~specks).sum()),
     )
     return weights, report
+
+
+class WeightedDeformer(Deformer, Protocol):
+    """A deformer with a weight for each handle: what a row that `has_weights` binds."""
+
+    sparse_weights: sp.csr_array
+    report: BbwReport
+
+    @property
+    def weights(self) -> NDArray[np.float64]:
+        """(n, H) weight of every handle at every node."""
+        ...
 
 
 class BbwDeformer:
@@ -211,7 +223,14 @@ class BbwDeformer:
         deformer._bind(rest, handles, weights, options, report or BbwReport())
         return deformer
 
-    def _bind(self, rest, handles, weights, options, report):
+    def _bind(
+        self,
+        rest: NDArray[np.float64],
+        handles: Handles,
+        weights: sp.csr_array,
+        options: BbwOptions,
+        report: BbwReport,
+    ) -> None:
         self._rest = np.ascontiguousarray(rest, np.float64)
         self._handles = handles
         self._resting = handles.resting(len(self._rest))

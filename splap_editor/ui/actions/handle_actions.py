@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from splap_editor.engine.edit import Pose
+from splap_editor.core.pose import Pose
 from splap_editor.session.placement import rows_region
 from splap_editor.session.session import Session
 from splap_editor.viewport.viewport import Viewport

@@ -17,7 +17,8 @@ from PySide6.QtWidgets import (
 )
 
 from splap_editor.core.options import world_length
-from splap_editor.engine.edit import Handle, Pose
+from splap_editor.core.pose import Pose
+from splap_editor.engine.edit import Handle
 from splap_editor.session.scene import Scene
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session

@@ -5,8 +5,8 @@ from numpy.typing import ArrayLike, NDArray
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QWidget
 
+from splap_editor.core.pose import Pose
 from splap_editor.core.splats.rotations import matrices_to_quats, quats_to_matrices
-from splap_editor.engine.edit import Pose
 from splap_editor.ui.theme import STEP
 from splap_editor.ui.widgets.number_field import NumberField, ScrubLabel
 from splap_editor.ui.widgets.plain_text import PlainLabel

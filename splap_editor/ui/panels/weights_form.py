@@ -42,7 +42,7 @@ class WeightsForm(QWidget):
 
     def _show(self) -> None:
         bound = self._session.bound
-        lines = weight_lines(bound.edit, bound.deformer.report) if bound and bound.edit.deformer.has_weights else []
+        lines = weight_lines(bound.edit, bound.weighted.report) if bound and bound.weighted else []
         while len(self.labels) < len(lines):
             label = PlainLabel(wordWrap=True, textInteractionFlags=Qt.TextInteractionFlag.TextSelectableByMouse)
             self._lines.addWidget(label)
