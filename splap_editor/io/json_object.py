@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from difflib import get_close_matches
 from typing import Any, Literal, TypeVar, overload
 
@@ -129,9 +130,10 @@ class JsonObject:
             raise self.refuse(key, f"a list of {size} finite numbers{bound}")
         return tuple(numbers)
 
-    def options(self, group: type[Group]) -> Group:
-        """An option group, each option under its name; a missing one takes its default."""
-        return group(**{name: self._option(name, known) for name, known in options_of(group).items() if name in self})
+    def options(self, group: type[Group], usual: Group | None = None) -> Group:
+        """An option group, each option under its name; a missing one is as in ``usual``, or takes its default."""
+        said = {name: self._option(name, known) for name, known in options_of(group).items() if name in self}
+        return group(**said) if usual is None else replace(usual, **said)  # type: ignore[type-var]
 
     def _option(self, key: str, known: Option) -> Any:
         if known.kind == "pairs":

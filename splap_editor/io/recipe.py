@@ -12,6 +12,7 @@ from splap_editor.core.deformers import DEFORMERS, method_titles
 from splap_editor.core.graph.options import GraphOptions, Joint, Separation
 from splap_editor.core.options import OptionSet, ShareOfSize, options_of
 from splap_editor.core.pose import LARGEST_COORDINATE, SCALES, Pose
+from splap_editor.core.presets import PRESETS, with_preset
 from splap_editor.core.reach_options import CageOptions, ReachOptions
 from splap_editor.io.atomic_file import atomic_file
 from splap_editor.io.json_object import JsonObject, json_lines, parsed_json, shown
@@ -50,7 +51,7 @@ def recipe_groups() -> tuple[tuple[str, type], ...]:
 def recipe_keys() -> tuple[str, ...]:
     """Keys that a recipe may have."""
     keys = [key for key, group in recipe_groups() for key in ([key] if key else options_of(group))]
-    return ("version", "method", "handles", "pins", *keys)
+    return ("version", "preset", "method", "handles", "pins", *keys)
 
 
 class RecipeError(ValueError):
@@ -101,7 +102,7 @@ def write_recipe(path: str | os.PathLike[str], recipe: Recipe) -> None:
 def recipe_from_json(value: Any) -> Recipe:
     """Make a recipe of what ``json`` parsed.
 
-    A missing key takes its default; rotations are normalised.
+    A missing key takes its default, or what the preset says, which is not kept by its name; rotations are normalised.
 
     Raises
     ------
@@ -117,8 +118,11 @@ def recipe_from_json(value: Any) -> Recipe:
         if isinstance(version, bool) or version != VERSION:
             raise RecipeError(f"version must be {VERSION}, got {shown(version)}: a newer one needs a newer editor")
     recipe = JsonObject(value, "", recipe_keys(), RecipeError)
+    usual = OptionSet()
+    if "preset" in recipe:
+        usual = with_preset(usual, recipe.choice("preset", tuple(PRESETS), ""))
     groups: list[Any] = [
-        (recipe.object(key, tuple(options_of(group))) if key else recipe).options(group)
+        (recipe.object(key, tuple(options_of(group))) if key else recipe).options(group, usual[group])
         for key, group in recipe_groups()
     ]
     return Recipe(

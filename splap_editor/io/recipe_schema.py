@@ -10,6 +10,7 @@ from typing import Any
 from splap_editor.core.deformers import method_titles
 from splap_editor.core.options import Option, ShareOfSize, options_of
 from splap_editor.core.pose import LARGEST_COORDINATE, SCALES
+from splap_editor.core.presets import PRESETS
 from splap_editor.core.reach_options import CageOptions
 from splap_editor.io.recipe import VERSION, recipe_groups
 
@@ -28,6 +29,11 @@ def recipe_schema() -> dict[str, Any]:
     """
     properties: dict[str, Any] = {
         "version": {"const": VERSION},
+        "preset": {
+            "enum": list(PRESETS),
+            "description": "Options that the other keys start from. "
+            + " ".join(f"{name}: {preset.sentence}" for name, preset in PRESETS.items()),
+        },
         "method": {"enum": list(method_titles()), "default": next(iter(method_titles()))},
         "handles": {"type": "array", "items": _placed(_handle_properties())},
         "pins": {"type": "array", "items": _placed({})},

@@ -9,6 +9,7 @@ from splap_editor.core.graph.splat_graph import SplatGraph
 from splap_editor.core.index_spaces import Node, Nodes
 from splap_editor.core.splats.occupancy import Ellipses
 from splap_editor.core.surface.geodesics import Neighborhoods, geodesic_distances
+from splap_editor.core.surface.neighborhoods import mahalanobis_frame
 
 NEIGHBOR_KINDS = {
     "graph": "Splat graph",
@@ -17,9 +18,6 @@ NEIGHBOR_KINDS = {
     "mahalanobis": "Nearest by Mahalanobis",
 }
 """Names of the answers, and words for them."""
-
-NORMAL_SHARE = 0.1
-"""Standard deviation across the surface in units of the smaller one within it, for Mahalanobis distances."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,11 +92,7 @@ def neighbor_set(
     if kind == "euclidean":
         return _nearest(np.einsum("ij,ij->i", steps, steps), node, k)
     if kind == "mahalanobis":
-        axes = ellipses.semi_axes[node]
-        minor = np.linalg.norm(axes[1])
-        frame = np.stack([axes[0] / (axes[0] @ axes[0]), axes[1] / minor**2, ellipses.normals[node] / minor])
-        frame[2] /= NORMAL_SHARE
-        apart = steps @ frame.T
+        apart = steps @ mahalanobis_frame(ellipses, node).T
         return _nearest(np.einsum("ij,ij->i", apart, apart), node, k)
     raise ValueError(f"kind must be one of {', '.join(NEIGHBOR_KINDS)}, got {kind!r}")
 

@@ -125,7 +125,7 @@ def test_the_documented_recipe_is_read():
         ({"version": True}, "version must be 1, got true"),
         ({"version": "1"}, 'version must be 1, got "1"'),
         ({"handels": []}, "handels is not known: did you mean 'handles'"),
-        ({"zzz": 1}, "zzz is not known: the keys are version, method"),
+        ({"zzz": 1}, "zzz is not known: the keys are version, preset, method"),
         ({"method": "arapp"}, 'method must be "arap" or "bbw", got "arapp"'),
         ({"method": ["arap"]}, "method must be"),
         ({"free_radius": 0}, "free_radius must be a finite number greater than 0, got 0"),

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from splap_editor.core.graph.splat_graph import GraphOptions
+from splap_editor.core.surface.neighborhoods import NORMAL_SHARE
 from splap_editor.engine.surface import Surface, surface_of
 from splap_editor.io.ply import read_ply
 from splap_editor.resources import resource
-from splap_editor.session.neighbor_sets import NEIGHBOR_KINDS, NORMAL_SHARE, compared, neighbor_set
+from splap_editor.session.neighbor_sets import NEIGHBOR_KINDS, compared, neighbor_set
 
 
 @pytest.fixture(scope="module")

@@ -134,6 +134,9 @@ def adapt_kernels(
     neighbours, drawn to a similarity with the node's rotation in directions they do not span. Rigid motions and uniform
     scalings come through exactly.
 
+    "paper" is what the paper writes: corners move by the displacements, weighted by 1/distance, of the splat itself and
+    the two nearest along the graph.
+
     "affine" maps the ellipse by the least-squares affine map of its ``hops``-ring, the baseline of the paper. "none"
     moves the centres and nothing else.
 
@@ -187,7 +190,12 @@ def adapt_kernels(
     else:
         motions = _spare_motions(binding)
         carriers, weights = binding.carriers, binding.weights
-        if method == "surface":
+        if method == "paper":
+            find_moved(*nodes)
+            carriers, weights = binding.published_carriers
+            motions[:, :9] = np.eye(3).ravel()
+            motions[:, 9:] = np.where(moved[:, None], positions - rest.means[: len(positions)], 0.0)
+        elif method == "surface":
             find_motions(binding.stencils, binding.inverse_moments, binding.dampings, *nodes, motions)
         else:
             assert binding.graph is not None, "asked for at the door"

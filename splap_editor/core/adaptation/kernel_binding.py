@@ -1,5 +1,6 @@
 """What carries each splat's ellipse when the surface moves: found once per scene."""
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numba as nb
@@ -20,6 +21,9 @@ STENCIL_SIZE = 6
 
 STRETCH_DAMPING = 0.02
 """How far a stretch is drawn to a mere scaling, in units of the mean square neighbour distance."""
+
+HALF_ROOT_3 = 0.5 * np.sqrt(3.0)
+"""Height of an equilateral triangle of side 1: how far across the minor axis two corners of the inscribed one lie."""
 
 INERT_CARRIERS = 4
 """Active splats that carry a splat outside the graph."""
@@ -118,6 +122,7 @@ class KernelBinding:
             _find_stencils(
                 lo, hi, ellipses.centers, indptr, indices, self.stencils, self.inverse_moments, self.dampings
             )
+        self.neighborhoods = neighborhoods
         inert_rows = np.flatnonzero(ellipses.node_of_row < 0)
         self._bind_inert(np.asarray(splats.means, np.float64)[inert_rows])
         axes, self.thicknesses = _rest_axes(splats, ellipses, inert_rows)
@@ -154,6 +159,33 @@ class KernelBinding:
             weights = (distances[:, :1] / distances) ** 2
             self.inert_weights[finite] = weights / weights.sum(axis=1, keepdims=True)
 
+    @cached_property
+    def published_carriers(self) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+        """Carriers and weights as published [1]_: a splat and the two nearest to it, for each corner, by 1/distance.
+
+        References
+        ----------
+        .. [1] SpLap, 3DV 2026, Eq. 10.
+        """
+        n = self.ellipses.n_nodes
+        indptr, indices = self.neighborhoods.indptr, self.neighborhoods.indices
+        nodes = np.arange(n)
+        carriers = np.repeat(nodes[:, None], 3, axis=1)
+        for place in (0, 1):
+            reached = np.flatnonzero(indptr[:-1] + place < indptr[1:])
+            carriers[reached, place + 1] = indices[indptr[reached] + place]
+        along = np.array([[1.0, 0.0], [-0.5, HALF_ROOT_3], [-0.5, -HALF_ROOT_3]])
+        corners = self.ellipses.centers[:, None] + along @ self.ellipses.semi_axes
+        distances = np.linalg.norm(corners[:, :, None] - self.ellipses.centers[carriers][:, None], axis=3)
+        closeness = 1.0 / np.maximum(distances, 1e-12 * self.ellipses.reaches[:, None, None])
+        # Who has fewer neighbours carries itself more than once, which must not weigh more.
+        closeness[:, :, 1:][np.broadcast_to((carriers[:, None, 1:] == nodes[:, None, None]), (n, 3, 2))] = 0.0
+        weights = closeness / closeness.sum(axis=2, keepdims=True)
+        return (
+            np.tile(carriers, (1, 3)).astype(np.int32),
+            weights[:, :, :2].reshape(n, 6).astype(np.float32),
+        )
+
     @property
     def order(self) -> RowsByPlace:
         """(N,) file row of each place in carried order: the nodes, then the inert splats."""
@@ -186,7 +218,6 @@ def _rest_axes(
 @nb.njit(nogil=True, cache=True)
 def _find_carriers(lo, hi, centers, semi_axes, indptr, indices, carriers, weights):
     """Write the three nodes that carry each corner of the triangles of nodes lo to hi, and their weights."""
-    half_root_3 = 0.5 * np.sqrt(3.0)
     offset = np.empty(3)
     nearest = np.empty(3, np.int32)
     squares = np.empty(3)
@@ -194,7 +225,7 @@ def _find_carriers(lo, hi, centers, semi_axes, indptr, indices, carriers, weight
         for corner in range(3):
             for a in range(3):
                 major, minor = semi_axes[i, 0, a], semi_axes[i, 1, a]
-                offset[a] = major if corner == 0 else -0.5 * major + (3 - 2 * corner) * half_root_3 * minor
+                offset[a] = major if corner == 0 else -0.5 * major + (3 - 2 * corner) * HALF_ROOT_3 * minor
             reach = offset[0] ** 2 + offset[1] ** 2 + offset[2] ** 2
             nearest[:] = i
             squares[:] = np.inf

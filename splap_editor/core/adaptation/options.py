@@ -7,6 +7,9 @@ from splap_editor.core.options import Choice, check_options, option
 ADAPTATIONS = {
     "surface": Choice("Follows the surface", "The ellipse's inscribed triangle follows the surface."),
     "affine": Choice("Stretches with it", "The least-squares affine map of rings of neighbours, the paper's baseline."),
+    "paper": Choice(
+        "As in the paper", "The triangle's corners move by the displacements of the nearest along the graph."
+    ),
     "none": Choice("Moves only", "Centres move and nothing else."),
 }
 

@@ -40,6 +40,21 @@ NEIGHBORHOODS = {
         "splap_editor.core.surface.neighborhoods:nearest_along_surface",
         mended="splap_editor.core.surface.geodesics:mended_neighborhoods",
     ),
+    "edges": Neighborhood(
+        "Joined by an edge",
+        "Those that an edge of the graph leads to, however many.",
+        "splap_editor.core.surface.neighborhoods:joined_by_edges",
+    ),
+    "space": Neighborhood(
+        "In space",
+        "The k nearest centres, whatever lies between.",
+        "splap_editor.core.surface.neighborhoods:nearest_in_space",
+    ),
+    "mahalanobis": Neighborhood(
+        "By Mahalanobis",
+        "The k nearest as each splat's own ellipse measures, a tenth as thick as it is narrow.",
+        "splap_editor.core.surface.neighborhoods:nearest_by_mahalanobis",
+    ),
 }
 """Neighbourhoods by name: ``neighbors(ellipses, graph, k, progress)`` gives `Neighborhoods`."""
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.graph.splat_graph import GraphOptions
+from splap_editor.core.presets import PRESETS, with_preset
 from splap_editor.session.cards import has_edge
 from splap_editor.session.mends import best_links, edges_between, fragment_links, fragments, with_added, with_cut
 from splap_editor.session.scene_follower import SceneFollower
@@ -58,6 +59,14 @@ class GraphActions:
     def cycle(self) -> None:
         """Go on to the next way of drawing edges."""
         self._graph_view.set(shown=SHOWN[(SHOWN.index(self._graph_view.options.shown) + 1) % len(SHOWN)])
+
+    # Options ----------------------------------------------------------------------------------------------------------
+
+    def take_preset(self, name: str = "paper") -> None:
+        """Set the options that a preset names, for graph, deformers and splats alike."""
+        edit = self._session.scene.edit
+        self._session.change_edit(replace(edit, options=with_preset(edit.options, name)), PRESETS[name].label)
+        self._say(PRESETS[name].sentence)
 
     # Mends --------------------------------------------------------------------------------------------------------
 

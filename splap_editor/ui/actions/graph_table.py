@@ -5,6 +5,7 @@ from splap_editor.ui.actions.conditions import (
     has_edge,
     has_fragments,
     has_mends,
+    has_scene,
     has_selection,
     has_side_a,
     has_surface,
@@ -41,6 +42,15 @@ GRAPH_TABLE: tuple[ActionSpec, ...] = (
         tip="None, near, all.",
         needs=has_surface,
         menu="G&raph",
+    ),
+    A(
+        "graph.preset_paper",
+        GraphActions.take_preset,
+        "As in the &paper",
+        tip="Graph, Laplacian, solver and splat shapes as published, to compare with; undo takes it back.",
+        needs=has_scene,
+        menu="G&raph",
+        breaks=True,
     ),
     A(
         "graph.cut_edge",
