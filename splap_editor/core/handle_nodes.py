@@ -78,9 +78,9 @@ def handle_nodes(
     tree = cKDTree(ellipses.centers)
     labels = np.full(ellipses.n_nodes, FREE, np.int32)
     for pin in pins:
-        labels[_nodes_in(pin, ellipses, tree)] = PIN
+        labels[region_nodes(pin, ellipses, tree)] = PIN
     for label in range(len(handles) - 1, -1, -1):
-        labels[_nodes_in(handles[label], ellipses, tree)] = label
+        labels[region_nodes(handles[label], ellipses, tree)] = label
     if free_radius is not None and (labels >= 0).any():
         moved = cKDTree(ellipses.centers[labels >= 0])
         others = np.flatnonzero(labels == FREE)
@@ -91,8 +91,22 @@ def handle_nodes(
     return Handles(indices=indices, labels=labels[indices], centers=centers, cage_radii=cages)
 
 
-def _nodes_in(region: Region, ellipses: Ellipses, tree: cKDTree) -> Nodes:
-    """Nodes of one region: at least one."""
+def region_nodes(region: Region, ellipses: Ellipses, tree: cKDTree | None = None) -> Nodes:
+    """Nodes of one region, ascending: at least one.
+
+    Parameters
+    ----------
+    region : Region
+    ellipses : Ellipses
+        The scene's active splats; at least one.
+    tree : cKDTree, optional
+        Over their centres, where it is there already.
+
+    Raises
+    ------
+    ValueError
+        If the centre is not three finite numbers, the radius is negative or a row is outside the file.
+    """
     center = np.asarray(region.center, np.float64)
     if center.shape != (3,) or not np.isfinite(center).all():
         raise ValueError(f"a region's center must be three finite numbers, got {region.center}")
@@ -106,7 +120,9 @@ def _nodes_in(region: Region, ellipses: Ellipses, tree: cKDTree) -> Nodes:
     else:
         if not region.radius >= 0:
             raise ValueError(f"a region's radius must not be negative, got {region.radius}")
+        tree = tree or cKDTree(ellipses.centers)
         nodes = np.asarray(tree.query_ball_point(center, region.radius), np.int64)
     if len(nodes) == 0:
+        tree = tree or cKDTree(ellipses.centers)
         nodes = np.array([tree.query(center)[1]], np.int64)
     return np.unique(nodes)

@@ -230,7 +230,7 @@ def handles_of(surface: Surface, edit: Edit) -> Handles:
     return handle_nodes(
         surface.ellipses,
         [handle.region for handle in edit.active_handles],
-        list(edit.pins),
+        [pin.region for pin in edit.pins],
         free_radius=free,
         cage_radii=[np.inf if radius is None else radius for radius in cages],
     )

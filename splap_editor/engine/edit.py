@@ -15,8 +15,11 @@ from splap_editor.core.pose import Pose
 from splap_editor.core.reach_options import CageOptions
 from splap_editor.engine.timeline import Timeline
 
-HANDLE_COLORS = ("#f2a93b", "#4fb3ff", "#7bd66b", "#e66fb0", "#b18cff", "#ff7a59", "#49d3c2", "#d9d24a")
+HANDLE_COLORS = ("#f2a93b", "#4fb3ff", "#7bd66b", "#e66fb0", "#b18cff", "#ff7a59", "#30bfae", "#d9d24a")
 """Handle colours in the order they are given out; told apart by the colour-blind too when neighbours in the list."""
+
+PIN_COLOR = "#e42460"
+"""Colour of every pin; the colour-blind too tell it from handles, selection and what is under the pointer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +55,33 @@ class Handle:
         """(4, 4) world transform of the pose."""
         return self.pose.matrix(np.asarray(self.region.center, np.float64))
 
+    @property
+    def moved_center(self) -> NDArray[np.float64]:
+        """(3,) where the pose brings the centre, world units."""
+        return np.asarray(self.region.center, np.float64) + self.pose.translate
+
+
+@dataclass(frozen=True, eq=False)
+class Pin:
+    """Splats that stay where they are.
+
+    Parameters
+    ----------
+    pin_id : int
+        Stays the same through every change.
+    name : str
+        As listed.
+    region : Region
+        The splats. Compared by identity: a change of region is a new object.
+    reach : float, optional
+        Radius, in world units, of the disc on the surface, or the ball, that the region is; None where it is neither.
+    """
+
+    pin_id: int
+    name: str
+    region: Region
+    reach: float | None = None
+
 
 @dataclass(frozen=True, eq=False)
 class Edit:
@@ -60,8 +90,7 @@ class Edit:
     Parameters
     ----------
     handles : tuple of Handle
-    pins : tuple of Region
-        Splats that stay put.
+    pins : tuple of Pin
     method : str
         One of those in `DEFORMERS`.
     options : OptionSet
@@ -71,7 +100,7 @@ class Edit:
     """
 
     handles: tuple[Handle, ...] = ()
-    pins: tuple[Region, ...] = ()
+    pins: tuple[Pin, ...] = ()
     method: str = "arap"
     options: OptionSet = OptionSet()
     timeline: Timeline = field(default_factory=Timeline)
@@ -125,6 +154,24 @@ class Edit:
         gone = set(handle_ids)
         return replace(self, handles=tuple(h for h in self.handles if h.handle_id not in gone))
 
+    def pin(self, pin_id: int) -> Pin:
+        """Find a pin by its id; KeyError when there is none."""
+        for pin in self.pins:
+            if pin.pin_id == pin_id:
+                return pin
+        raise KeyError(pin_id)
+
+    def with_pin(self, changed: Pin) -> "Edit":
+        """Replace the pin of the same id, or append it."""
+        if any(pin.pin_id == changed.pin_id for pin in self.pins):
+            return replace(self, pins=tuple(changed if p.pin_id == changed.pin_id else p for p in self.pins))
+        return replace(self, pins=(*self.pins, changed))
+
+    def without_pins(self, pin_ids: Iterable[int]) -> "Edit":
+        """Drop the pins of these ids."""
+        gone = set(pin_ids)
+        return replace(self, pins=tuple(pin for pin in self.pins if pin.pin_id not in gone))
+
     def with_poses(self, poses: dict[int, Pose]) -> "Edit":
         """Pose some handles, by id."""
         return replace(
@@ -137,6 +184,10 @@ class Edit:
         keyed = (handle_id for key in self.timeline.keys for handle_id in key.poses)
         return max((*(handle.handle_id for handle in self.handles), *keyed), default=0) + 1
 
+    def next_pin_id(self) -> int:
+        """Give an id that no pin of this edit has."""
+        return max((pin.pin_id for pin in self.pins), default=0) + 1
+
 
 def binds_like(a: Edit, b: Edit) -> bool:
     """Whether a deformer bound for one edit serves the other: same regions, pins and options it uses, any pose."""
@@ -148,7 +199,7 @@ def binds_like(a: Edit, b: Edit) -> bool:
     left, right = a.active_handles, b.active_handles
     return (
         len(left) == len(right)
-        and all(x is y for x, y in zip(a.pins, b.pins, strict=True))
+        and all(x.region is y.region for x, y in zip(a.pins, b.pins, strict=True))
         and all(
             x.region is y.region and (not row.has_weights or x.cage_radius == y.cage_radius)
             for x, y in zip(left, right, strict=True)

@@ -4,7 +4,7 @@ import numpy as np
 
 from splap_editor.core.handle_nodes import Region
 from splap_editor.core.splats.splats import Splats
-from splap_editor.engine.edit import HANDLE_COLORS, Edit, Handle
+from splap_editor.engine.edit import HANDLE_COLORS, Edit, Handle, Pin
 from splap_editor.io.recipe import HandleSpec, PinSpec, Recipe, RecipeError
 from splap_editor.io.recipe_specs import Vector
 
@@ -13,7 +13,10 @@ def recipe_of(edit: Edit, *, with_disabled: bool = False) -> Recipe:
     """Write an edit as a recipe; disabled handles are left out unless wanted, since they do nothing."""
     return Recipe(
         handles=tuple(_handle_spec(handle) for handle in (edit.handles if with_disabled else edit.active_handles)),
-        pins=tuple(PinSpec(*_place(pin)) for pin in edit.pins),
+        pins=tuple(
+            PinSpec(*_place(pin.region), name="" if pin.name == _pin_name(number) else pin.name)
+            for number, pin in enumerate(edit.pins, start=1)
+        ),
         method=edit.method,
         options=edit.options,
     )
@@ -42,10 +45,18 @@ def edit_of(recipe: Recipe, splats: Splats) -> Edit:
     )
     return Edit(
         handles=handles,
-        pins=tuple(_region(spec, splats, f"pin {number}") for number, spec in enumerate(recipe.pins, start=1)),
+        pins=tuple(
+            Pin(number, spec.name or _pin_name(number), _region(spec, splats, f"pin {number}"), spec.radius)
+            for number, spec in enumerate(recipe.pins, start=1)
+        ),
         method=recipe.method,
         options=recipe.options,
     )
+
+
+def _pin_name(number: int) -> str:
+    """Name of a pin that a recipe gives none."""
+    return f"Pin {number}"
 
 
 def _handle_spec(handle: Handle) -> HandleSpec:

@@ -36,6 +36,7 @@ __all__ = [
 VERSION = 1
 
 REGION_KEYS = ("center", "radius", "rows")
+PIN_KEYS = (*REGION_KEYS, "name")
 HANDLE_KEYS = ("name", *REGION_KEYS, "translate", "rotate", "scale", *options_of(CageOptions))
 
 
@@ -91,7 +92,7 @@ def write_recipe(path: str | os.PathLike[str], recipe: Recipe) -> None:
     try:
         data = json_lines(held).encode()
     except UnicodeEncodeError:
-        raise RecipeError("a handle has a name that cannot be written: rename it") from None
+        raise RecipeError("a handle or pin has a name that cannot be written: rename it") from None
     try:
         with atomic_file(path) as file:
             file.write(data)
@@ -127,7 +128,7 @@ def recipe_from_json(value: Any) -> Recipe:
     ]
     return Recipe(
         handles=tuple(_handle(h, i) for i, h in enumerate(recipe.objects("handles", HANDLE_KEYS))),
-        pins=tuple(PinSpec(*_region(pin)) for pin in recipe.objects("pins", REGION_KEYS)),
+        pins=tuple(PinSpec(*_region(pin), pin.text("name", "")) for pin in recipe.objects("pins", PIN_KEYS)),
         method=recipe.choice("method", tuple(method_titles()), Recipe.method),
         options=OptionSet(*groups),
     )

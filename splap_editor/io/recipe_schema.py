@@ -36,7 +36,7 @@ def recipe_schema() -> dict[str, Any]:
         },
         "method": {"enum": list(method_titles()), "default": next(iter(method_titles()))},
         "handles": {"type": "array", "items": _placed(_handle_properties())},
-        "pins": {"type": "array", "items": _placed({})},
+        "pins": {"type": "array", "items": _placed({"name": {"type": "string", "default": ""}})},
     }
     for key, group in recipe_groups():
         options = {name: _option(known) for name, known in options_of(group).items()}

@@ -22,11 +22,14 @@ class PinSpec:
         World units.
     rows : tuple of int, optional
         File rows, instead of center and radius.
+    name : str
+        As listed; empty for a numbered one.
     """
 
     center: Vector | None = None
     radius: float | None = None
     rows: tuple[int, ...] | None = None
+    name: str = ""
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from splap_editor.io.regular_file import open_regular, regular_bytes
 from splap_editor.io.session_specs import (
     HandleSettings,
     KeySpec,
+    PinSettings,
     PlySpec,
     Scalar,
     SessionFile,
@@ -36,7 +37,9 @@ _KEYS = (
     "ply",
     "recipe",
     "handles",
+    "pins",
     "active_handles",
+    "active_pins",
     "timeline",
     "view",
     "display",
@@ -136,6 +139,10 @@ def session_from_json(value: Any) -> SessionFile:
     ids = [handle.handle_id for handle in handles]
     if len(handles) != len(recipe.handles) or len(set(ids)) < len(ids):
         raise SessionFileError(f"handles must name each of the {len(recipe.handles)} handles of the recipe once")
+    pins = tuple(_pin(pin) for pin in session.objects("pins", ("id", "reach")))
+    pin_ids = [pin.pin_id for pin in pins]
+    if pins and (len(pins) != len(recipe.pins) or len(set(pin_ids)) < len(pin_ids)):
+        raise SessionFileError(f"pins must name each of the {len(recipe.pins)} pins of the recipe once")
     sets = {}
     for item in session.objects("selection_sets", ("name", "splats")):
         name = item.text("name", "")
@@ -146,7 +153,9 @@ def session_from_json(value: Any) -> SessionFile:
         ply,
         recipe,
         handles,
-        tuple(i for i in session.rows("active_handles") if i in ids) if value.get("active_handles") else (),
+        pins,
+        _chosen(session, "active_handles", ids),
+        _chosen(session, "active_pins", pin_ids),
         _timeline(session.object("timeline", ("frame", "n_frames", "fps", "interpolation", "auto_key", "keys"))),
         _view(session.object("view", _VIEW_KEYS)) if value.get("view") is not None else None,
         _display(value.get("display", {})),
@@ -165,8 +174,11 @@ def session_to_json(session: SessionFile) -> dict[str, Any]:
     value: dict[str, Any] = {"format": FORMAT, "version": VERSION, "ply": ply}
     value["recipe"] = recipe_to_json(session.recipe)
     value["handles"] = [{"id": h.handle_id, "color": h.color, "enabled": h.enabled} for h in session.handles]
-    if session.active_handles:
-        value["active_handles"] = list(session.active_handles)
+    if session.pins:
+        value["pins"] = [_pin_json(pin) for pin in session.pins]
+    for name in ("active_handles", "active_pins"):
+        if getattr(session, name):
+            value[name] = list(getattr(session, name))
     value["timeline"] = _timeline_json(session.timeline)
     if session.view is not None:
         value["view"] = _view_json(session.view)
@@ -199,6 +211,20 @@ def _handle(handle: JsonObject) -> HandleSettings:
     if not re.fullmatch("#[0-9a-fA-F]{6}", color):
         raise handle.refuse("color", 'a colour as "#rrggbb"')
     return HandleSettings(handle.integer("id", 0, low=1), color, handle.flag("enabled", True))
+
+
+def _pin(pin: JsonObject) -> PinSettings:
+    reach = pin.number("reach", above=0.0) if "reach" in pin else None
+    return PinSettings(pin.integer("id", 0, low=1), reach)
+
+
+def _pin_json(pin: PinSettings) -> dict[str, Any]:
+    return {"id": pin.pin_id} if pin.reach is None else {"id": pin.pin_id, "reach": pin.reach}
+
+
+def _chosen(session: JsonObject, key: str, known: list[int]) -> tuple[int, ...]:
+    """Ids that are chosen, as far as there are such handles or pins."""
+    return tuple(i for i in session.rows(key) if i in known) if key in session else ()
 
 
 def _timeline(timeline: JsonObject) -> TimelineSpec:

@@ -43,6 +43,14 @@ class HandleSettings:
 
 
 @dataclass(frozen=True)
+class PinSettings:
+    """What a pin has besides its recipe."""
+
+    pin_id: int
+    reach: float | None = None
+
+
+@dataclass(frozen=True)
 class KeySpec:
     """Poses of handles, by id, at a frame."""
 
@@ -86,8 +94,10 @@ class SessionFile:
         With the disabled handles too.
     handles : tuple of HandleSettings
         In the order of the recipe's handles.
-    active_handles : tuple of int
-        Ids of the chosen handles.
+    pins : tuple of PinSettings
+        In the order of the recipe's pins; empty in files from before pins had ids.
+    active_handles, active_pins : tuple of int
+        Ids of the chosen handles and pins.
     timeline : TimelineSpec
     view : ViewSpec, optional
     display : mapping
@@ -102,7 +112,9 @@ class SessionFile:
     ply: PlySpec
     recipe: Recipe = field(default_factory=Recipe)
     handles: tuple[HandleSettings, ...] = ()
+    pins: tuple[PinSettings, ...] = ()
     active_handles: tuple[int, ...] = ()
+    active_pins: tuple[int, ...] = ()
     timeline: TimelineSpec = field(default_factory=TimelineSpec)
     view: ViewSpec | None = None
     display: Mapping[str, Scalar] = field(default_factory=dict)

@@ -99,6 +99,5 @@ class ChangeSelectionSets:
 
 
 def _regions(edit: Edit) -> Iterator[Region]:
-    yield from edit.pins
-    for handle in edit.handles:
-        yield handle.region
+    yield from (pin.region for pin in edit.pins)
+    yield from (handle.region for handle in edit.handles)

@@ -1,13 +1,16 @@
 """Where a new handle or pin goes: a disc on the surface, held at the pose it has on screen."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from splap_editor.core.arap.rotation_fit import fit_rotations
-from splap_editor.core.handle_nodes import Region
+from splap_editor.core.handle_nodes import Region, region_nodes
 from splap_editor.core.index_spaces import FileRow, FileRows
 from splap_editor.core.pose import Pose
 from splap_editor.core.splats.rotations import matrices_to_quats
 from splap_editor.core.surface.geodesics import geodesic_distances
+from splap_editor.engine.edit import Pin
 from splap_editor.session.scene import Scene
 
 
@@ -45,6 +48,22 @@ def rows_region(scene: Scene, rows: FileRows) -> Region:
     """Region of given file rows about the mean of their rest positions, as a recipe has it."""
     rows = np.unique(np.asarray(rows, np.int64))
     return Region(np.asarray(scene.splats.means, np.float64)[rows].mean(axis=0), 0.0, rows)
+
+
+def moved_pin(scene: Scene, pin: Pin, row: FileRow) -> Pin:
+    """Pin that is the disc of the same reach about another splat; one that is no disc stays where it is."""
+    if pin.reach is None:
+        return pin
+    return replace(pin, region=rows_region(scene, disc_rows(scene, row, pin.reach)))
+
+
+def pin_with_reach(scene: Scene, pin: Pin, reach: float) -> Pin:
+    """Pin that is the disc of another reach, in world units, about the splat nearest to its centre."""
+    center = np.asarray(pin.region.center, np.float64)
+    rows = scene.ellipses.rows[region_nodes(pin.region, scene.ellipses)]
+    middle = int(rows[np.argmin(np.linalg.norm(scene.splats.means[rows] - center, axis=1))])
+    # The centre stays, so that growing and shrinking come back to where they began.
+    return replace(pin, region=Region(center, 0.0, disc_rows(scene, middle, reach)), reach=reach)
 
 
 def held_pose(scene: Scene, region: Region) -> Pose:

@@ -15,6 +15,7 @@ from splap_editor.io.session_file import SessionFileError, relative_path
 from splap_editor.io.session_specs import (
     HandleSettings,
     KeySpec,
+    PinSettings,
     PlySpec,
     Scalar,
     SessionFile,
@@ -44,6 +45,7 @@ class SavedState:
     n_splats: int
     edit: Edit
     active_handles: tuple[int, ...]
+    active_pins: tuple[int, ...]
     selection: FileMask
     hidden: FileMask
     selection_sets: Mapping[str, FileMask]
@@ -68,6 +70,7 @@ def saved_state(scene: Scene, look: Look) -> SavedState:
         scene.splats.n_splats,
         scene.edit,
         scene.active_handles,
+        scene.active_pins,
         scene.selection,
         scene.hidden,
         scene.selection_sets,
@@ -83,7 +86,9 @@ def session_file_of(state: SavedState, folder: Path | None, content_hash: str) -
         PlySpec(source, content_hash, state.n_splats, state.layout),
         recipe_of(edit, with_disabled=True),
         tuple(HandleSettings(h.handle_id, h.color, h.enabled) for h in edit.handles),
+        tuple(PinSettings(pin.pin_id, pin.reach) for pin in edit.pins),
         state.active_handles,
+        state.active_pins,
         _timeline_spec(edit.timeline),
         state.look.view,
         state.look.display,
@@ -112,7 +117,13 @@ def session_edit(session: SessionFile, splats: Splats) -> Edit:
         replace(handle, handle_id=settings.handle_id, color=settings.color, enabled=settings.enabled)
         for handle, settings in zip(edit.handles, session.handles, strict=True)
     )
-    return replace(edit, handles=handles, timeline=_timeline(session.timeline))
+    pins = edit.pins
+    if session.pins:
+        pins = tuple(
+            replace(pin, pin_id=settings.pin_id, reach=settings.reach)
+            for pin, settings in zip(pins, session.pins, strict=True)
+        )
+    return replace(edit, handles=handles, pins=pins, timeline=_timeline(session.timeline))
 
 
 def restore_scene(scene: Scene, session: SessionFile) -> None:
@@ -129,6 +140,8 @@ def restore_scene(scene: Scene, session: SessionFile) -> None:
         raise SessionFileError(f"the session does not fit {scene.file.path.name}: {error}") from None
     known = {handle.handle_id for handle in scene.edit.handles}
     scene.active_handles = tuple(handle_id for handle_id in session.active_handles if handle_id in known)
+    pins = {pin.pin_id for pin in scene.edit.pins}
+    scene.active_pins = tuple(pin_id for pin_id in session.active_pins if pin_id in pins)
     if session.ply.n_splats == scene.splats.n_splats:
         for name in ("selection", "hidden"):
             if getattr(session, name) is not None:

@@ -13,6 +13,7 @@ from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.edit import Edit
 from splap_editor.engine.surface import Surface
 from splap_editor.io.ply import SplatFile
+from splap_editor.session.pivot import Pivot
 from splap_editor.session.signals import Signal
 
 
@@ -35,6 +36,9 @@ class Scene:
         self.hidden = np.zeros(file.splats.n_splats, bool)
         self.selection_sets: Mapping[str, FileMask] = {}
         self.active_handles: tuple[int, ...] = ()
+        self.active_pins: tuple[int, ...] = ()
+        self.pivot = Pivot.MEDIAN
+        self.pivot_at: NDArray[np.float64] | None = None
         self.picked: FileRow | None = None
         self.surface_changed = Signal()
         self.edit_changed = Signal()
@@ -44,6 +48,7 @@ class Scene:
         self.hidden_changed = Signal()
         self.selection_sets_changed = Signal()
         self.active_handles_changed = Signal()
+        self.pivot_changed = Signal()
         self.picked_changed = Signal()
 
     @property
@@ -57,6 +62,11 @@ class Scene:
         return self.preview if self.preview is not None else self.edit
 
     @property
+    def active_handle(self) -> int | None:
+        """Id of the handle chosen last, whose numbers are shown."""
+        return self.active_handles[-1] if self.active_handles else None
+
+    @property
     def positions(self) -> NDArray[np.floating]:
         """(N, 3) centres on screen, in world units and file order."""
         return self.splats.means if self.kernels is None else self.kernels.means
@@ -67,13 +77,15 @@ class Scene:
         self.surface_changed.emit()
 
     def set_edit(self, edit: Edit) -> None:
-        """Replace the edit; the preview of a drag is dropped, and so are active handles that are gone."""
+        """Replace the edit; the preview of a drag is dropped, and so is the choice of what is gone."""
         self.edit = edit
         self.preview = None
         known = {handle.handle_id for handle in edit.handles}
         kept = tuple(handle_id for handle_id in self.active_handles if handle_id in known)
+        pins = {pin.pin_id for pin in edit.pins}
+        kept_pins = tuple(pin_id for pin_id in self.active_pins if pin_id in pins)
         self.edit_changed.emit()
-        self.set_active_handles(kept)
+        self.set_active_handles(kept, kept_pins)
 
     def set_preview(self, edit: Edit | None) -> None:
         """Show an edit that is not in the history yet, or go back to the one that is."""
@@ -101,11 +113,18 @@ class Scene:
         self.selection_sets = sets
         self.selection_sets_changed.emit()
 
-    def set_active_handles(self, handle_ids: tuple[int, ...]) -> None:
-        """Choose the handles that gizmo and keys act on."""
-        if handle_ids != self.active_handles:
-            self.active_handles = handle_ids
+    def set_active_handles(self, handle_ids: tuple[int, ...], pin_ids: tuple[int, ...] = ()) -> None:
+        """Choose the handles that gizmo and keys act on, the one that is active in the last place, and pins."""
+        if (handle_ids, pin_ids) != (self.active_handles, self.active_pins):
+            self.active_handles, self.active_pins = handle_ids, pin_ids
             self.active_handles_changed.emit()
+
+    def set_pivot(self, pivot: Pivot, at: NDArray[np.float64] | None = None) -> None:
+        """Choose what the chosen handles turn about; ``at``: place the point, (3,) in world units."""
+        self.pivot = pivot
+        if at is not None:
+            self.pivot_at = np.asarray(at, np.float64)
+        self.pivot_changed.emit()
 
     def set_picked(self, row: FileRow | None) -> None:
         """Choose the splat that is inspected, by file row, or none."""

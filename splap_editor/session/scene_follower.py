@@ -20,6 +20,7 @@ class SceneHandlers(TypedDict, total=False):
     hidden_changed: Handler
     selection_sets_changed: Handler
     active_handles_changed: Handler
+    pivot_changed: Handler
     picked_changed: Handler
 
 

@@ -1,7 +1,6 @@
 """One open scene, its history and its background work: what the window and its tools talk to."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ from splap_editor.core.index_spaces import FileMask
 from splap_editor.core.pose import Pose
 from splap_editor.engine.bound_edit import BoundEdit
 from splap_editor.engine.cache import StageCache
-from splap_editor.engine.edit import HANDLE_COLORS, Edit, Handle
+from splap_editor.engine.edit import HANDLE_COLORS, Edit, Handle, Pin
 from splap_editor.engine.keyframes import auto_keyed_edit
 from splap_editor.engine.recipe_edit import edit_of, recipe_of
 from splap_editor.io.recipe import read_recipe, write_recipe
@@ -172,10 +171,13 @@ class Session:
         scene.set_active_handles((handle_id,))
         return handle
 
-    def add_pin(self, region: Region) -> None:
-        """Hold splats where they are."""
+    def add_pin(self, region: Region, *, reach: float | None = None) -> Pin:
+        """Hold splats where they are; ``reach``: the region is a disc on the surface of this radius."""
         edit = self.shown_scene.edit
-        self.change_edit(replace(edit, pins=(*edit.pins, region)), "Place pin")
+        pin_id = edit.next_pin_id()
+        pin = Pin(pin_id, f"Pin {pin_id}", region, reach)
+        self.change_edit(edit.with_pin(pin), "Place pin")
+        return pin
 
     # ------------------------------------------------------------------ a drag
 

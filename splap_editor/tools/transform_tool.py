@@ -1,4 +1,4 @@
-"""Moving handles: the gizmo, and G / R / S with axis locks and typed numbers."""
+"""Moving handles: the gizmo, and G / R / S with axis locks and typed numbers; choosing handles and pins."""
 
 from functools import partial
 
@@ -6,8 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.pose import Pose
-from splap_editor.engine.edit import Handle
+from splap_editor.engine.edit import Handle, Pin
+from splap_editor.session.pivot import Pivot
 from splap_editor.tools.bindings import Binding
+from splap_editor.tools.pin_stroke import PinStroke
 from splap_editor.tools.tool import KeyEvent, PointerEvent, Tool, ToolContext
 from splap_editor.viewport.gizmo import DOT, SCALE_BOX, VIEW_RING, Act, Lock, Part
 
@@ -190,31 +192,44 @@ class TransformTool(Tool):
         self.context.viewport.end_motion()
         self.context.viewport.gizmo_changed()
 
-    def choose(self, event: PointerEvent) -> bool:
-        """Choose the handle whose mark is under the cursor."""
-        handle_id = self._marked(event.xy)
-        if handle_id is not None:
-            self.context.session.scene.set_active_handles((handle_id,))
-        return handle_id is not None
+    def choose(self, event: PointerEvent) -> bool | PinStroke:
+        """Choose the handle or pin whose mark is under the cursor; a pin goes along with the pointer."""
+        found, scene = self._marked(event.xy), self.context.session.scene
+        if isinstance(found, Pin):
+            scene.set_active_handles((), (found.pin_id,))
+            return PinStroke(self.context, found, event)
+        if found is not None:
+            scene.set_active_handles((found.handle_id,))
+        return found is not None
 
     def choose_more(self, event: PointerEvent) -> bool:
-        """Choose one more handle, or one less."""
-        handle_id, scene = self._marked(event.xy), self.context.session.scene
-        if handle_id is not None:
-            others = tuple(i for i in scene.active_handles if i != handle_id)
-            scene.set_active_handles(others if handle_id in scene.active_handles else (*others, handle_id))
-        return handle_id is not None
+        """Choose one more handle or pin, or one less."""
+        found, scene = self._marked(event.xy), self.context.session.scene
+        handles, pins = scene.active_handles, scene.active_pins
+        if isinstance(found, Pin):
+            scene.set_active_handles(handles, toggled(pins, found.pin_id))
+        elif found is not None:
+            scene.set_active_handles(toggled(handles, found.handle_id), pins)
+        return found is not None
 
-    def _marked(self, xy: tuple[float, float]) -> int | None:
-        """Id of the handle whose mark is near a pixel."""
-        viewport, handles = self.context.viewport, self.context.session.scene.edit.active_handles
-        if not handles:
+    def place_pivot(self, event: PointerEvent) -> bool:
+        """Put the point that handles turn about where the pointer is on the surface."""
+        hit = self.context.viewport.pick(*event.xy)
+        if hit is not None:
+            self.context.session.scene.set_pivot(Pivot.POINT, hit.point)
+        return hit is not None
+
+    def _marked(self, xy: tuple[float, float]) -> Handle | Pin | None:
+        """The handle or pin whose mark is near a pixel; of two as near the one drawn on top."""
+        viewport, edit = self.context.viewport, self.context.session.scene.edit
+        marked = (*edit.active_handles, *edit.pins)
+        if not marked:
             return None
-        centers = np.array([np.asarray(h.region.center) + h.pose.translate for h in handles])
+        centers = np.array([each.moved_center if isinstance(each, Handle) else each.region.center for each in marked])
         distances = np.linalg.norm(viewport.projection.pixels(centers) - np.array(xy), axis=1)
         nearest = int(np.argmin(distances))
         is_near = distances[nearest] <= MARKER_REACH_PX * viewport.gizmo.scale
-        return handles[nearest].handle_id if is_near else None
+        return marked[nearest] if is_near else None
 
     def _active_handles(self) -> list[Handle]:
         scene = self.context.session.scene
@@ -231,8 +246,10 @@ class TransformTool(Tool):
             on="the gizmo",
             at_once=True,
         ),
-        Binding(("Click", "Ctrl+Click", "Alt+Click"), choose, "Choose the handle", on="its mark", at_once=True),
+        Binding(("Click", "Ctrl+Click", "Alt+Click"), choose, "Choose the handle or pin", on="its mark", at_once=True),
         Binding(("Shift+Click",), choose_more, "Choose one more, or one less", on="its mark", at_once=True),
+        Binding(("Drag",), choose, "Put the pin elsewhere", on="a pin's mark", at_once=True),
+        Binding(("Shift+Right click",), place_pivot, "Turn handles about this point", on="the surface", at_once=True),
         Binding(("G", "R", "S"), start, "Move, turn, scale with the pointer", "by key"),
     )
     active_bindings = (
@@ -249,6 +266,11 @@ class TransformTool(Tool):
         Binding(("Any+Move",), follow),
         Binding(("G", "R", "S"), start),
     )
+
+
+def toggled(chosen: tuple[int, ...], one: int) -> tuple[int, ...]:
+    """Choice with one more, in the last place, or without it."""
+    return tuple(each for each in chosen if each != one) if one in chosen else (*chosen, one)
 
 
 def _number(text: str) -> float | None:

@@ -10,6 +10,7 @@ from splap_editor.session.signals import Signal
 from splap_editor.viewport.looks import BACKGROUNDS, MODES
 from splap_editor.viewport.scene_view import SceneView
 from splap_editor.viewport.splat_scene import DEFAULT_LOOKS, Compare
+from splap_editor.viewport.tints import FIXED_TINTS
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,9 @@ class DisplayOptions:
     background : str
         Key of `BACKGROUNDS`.
     tints : bool
-        Handles in their colours, and what stays fixed darker.
+        Handles and pins in their colours, and what cannot move tinted.
+    fixed : str
+        How what cannot move is tinted: key of `FIXED_TINTS`.
     weights : bool
         The chosen handle's bounded biharmonic weights in bands of colour instead.
     """
@@ -41,13 +44,14 @@ class DisplayOptions:
     backface: float = 0.0
     background: str = "dark"
     tints: bool = True
+    fixed: str = "auto"
     weights: bool = False
 
 
 LARGEST = 4.0
 """Bound of every number among the options."""
 
-KEPT = ("mode", "backface", "background", "tints")
+KEPT = ("mode", "backface", "background", "tints", "fixed")
 """Options remembered between runs."""
 
 
@@ -65,6 +69,8 @@ class Display:
             kept["mode"] = default.mode
         if kept["background"] not in BACKGROUNDS:
             kept["background"] = default.background
+        if kept["fixed"] not in FIXED_TINTS:
+            kept["fixed"] = default.fixed
         self._sizes = {name: (DEFAULT_LOOKS[m].size_factor, DEFAULT_LOOKS[m].opacity_cut) for name, m in MODES.items()}
         size_factor, opacity_cut = self._sizes[kept["mode"]]
         self.options = replace(default, size_factor=size_factor, opacity_cut=opacity_cut, **kept)
@@ -83,7 +89,8 @@ class Display:
 
     def restore(self, held: Mapping[str, Any]) -> None:
         """Take options from a session file; what is unknown, of another kind or out of bounds is left as it is."""
-        choices = {"mode": MODES, "background": BACKGROUNDS, "shown": [compare.value for compare in Compare]}
+        shown = [compare.value for compare in Compare]
+        choices = {"mode": MODES, "background": BACKGROUNDS, "fixed": FIXED_TINTS, "shown": shown}
         values = {}
         for name, usual in vars(DisplayOptions()).items():
             value = held.get(name)
@@ -123,6 +130,8 @@ class Display:
         view.viewport.set_background(*BACKGROUNDS[options.background])
         if view.shows_tints != options.tints:
             view.shows_tints = options.tints
+        if view.fixed_tint != options.fixed:
+            view.fixed_tint = options.fixed
         if view.weights.is_on != options.weights:
             view.weights.is_on = options.weights
 

@@ -93,7 +93,7 @@ class Inspection:
     def _connect(self, session: Session) -> None:
         self.quantities.changed.connect(self._show_value)
         self.probe.changed.connect(self._show_value)
-        SceneFollower(session, self.probe.cancel)
+        SceneFollower(session, self.probe.cancel, picked_changed=self._on_picked)
         self._tools.chosen_changed.connect(self._on_tool_chosen)
         self.inspected.changed.connect(self.changed.emit)
         self.graph_actions.kept_changed.connect(self.changed.emit)
@@ -116,6 +116,10 @@ class Inspection:
     def _on_tool_chosen(self) -> None:
         self.inspected.is_on = self._tools.chosen.name == "inspect"
         if self.inspected.is_on:
+            bring_into_view(self.inspect_panel)
+
+    def _on_picked(self) -> None:
+        if self.inspected.is_on and self._session.scene.picked is not None:
             bring_into_view(self.inspect_panel)
 
     def _show_value(self) -> None:

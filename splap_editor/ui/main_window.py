@@ -157,6 +157,7 @@ class MainWindow(FileDrop, QMainWindow):
             selection_changed=self._refresh,
             hidden_changed=self._refresh,
             active_handles_changed=self._refresh,
+            pivot_changed=self._show_pivot,
             surface_changed=self._refresh,
             edit_changed=self._on_edit_changed,
         )
@@ -295,7 +296,11 @@ class MainWindow(FileDrop, QMainWindow):
         self.actions_.check("display.weights", options.weights)
         self.display.apply(self.view)
 
+    def _show_pivot(self) -> None:
+        self.actions_.check(f"handle.pivot_{self.session.scene.pivot.value}")
+
     def _on_scene_changed(self) -> None:
+        self._show_pivot()
         up = tuple(self.view.viewport.camera.world_up)
         self.actions_.check({(0.0, 0.0, 1.0): "view.up_z", (0.0, -1.0, 0.0): "view.down_y"}.get(up, "view.up_y"))
         self.display.apply(self.view)

@@ -198,7 +198,9 @@ def style_sheet() -> str:
     #sectionHeader:hover, #sectionHeader:checked:hover {{ background: {RAISED}; }}
     #detailsHeader, #detailsHeader:checked {{ background: transparent; color: {QUIET}; padding: 2px; }}
     #handleRow {{ border-radius: 4px; }}
-    #handleRow[active="true"] {{ background: {RAISED}; }}
+    #handleRow[chosen="yes"] {{ background: {RAISED}; }}
+    #handleRow[chosen="last"] {{ background: {RAISED}; border-left: 2px solid {ACCENT}; }}
+    #handleList, #handleList > QWidget > QWidget {{ background: transparent; }}
     QLabel[tone="quiet"] {{ color: {QUIET}; }}
     QLabel[tone="warning"] {{ color: {ACCENT}; }}
     QLabel[tone="danger"] {{ color: {DANGER}; }}

@@ -7,7 +7,7 @@ from vtkmodules.vtkRenderingCore import vtkActor, vtkRenderer
 from vtkmodules.vtkRenderingFreeType import vtkVectorText
 
 from splap_editor.viewport.gizmo_actor import AXIS_COLORS, cells_of, set_points, unlit_actor
-from splap_editor.viewport.overlays import Markers
+from splap_editor.viewport.overlays import Mark, Markers
 from splap_editor.viewport.projection import Projection
 
 _ARM_PX = 36.0
@@ -86,7 +86,8 @@ class AxesTriad:
         order = np.argsort(ends[:, 2])
         self._balls.set_size(_BALL_PX * self.scale)
         self._balls.set_viewport_size(projection.width, projection.height)
-        self._balls.show(ends[order], colors[order])
+        rgb = np.rint(255.0 * colors).astype(int)
+        self._balls.show([Mark(ends[i], tuple(rgb[i].tolist())) for i in order])
 
     def _look_at_pixels(self, projection: Projection) -> None:
         camera = self._renderer.GetActiveCamera()

@@ -1,5 +1,9 @@
 """Marks drawn over the scene: handles, rings on the surface."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from vtkmodules.util.numpy_support import numpy_to_vtk
@@ -11,8 +15,44 @@ from splap_editor.resources import shader
 from splap_editor.viewport.gizmo_actor import cells_of, set_points, unlit_actor
 
 
+class MarkShape(IntEnum):
+    """What a mark looks like."""
+
+    DOT = 0
+    SQUARE = 1
+    CROSS = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Mark:
+    """A mark of constant size on the screen.
+
+    Parameters
+    ----------
+    at : (3,) float64
+        World position.
+    color : (r, g, b)
+        0..255.
+    shape : MarkShape
+    is_chosen : bool
+        Rimmed white.
+    is_active : bool
+        Larger too.
+    """
+
+    at: NDArray[np.float64]
+    color: tuple[int, int, int]
+    shape: MarkShape = MarkShape.DOT
+    is_chosen: bool = False
+    is_active: bool = False
+
+
+_CODE_STEP = 28
+"""The fourth channel of a mark's colour says shape and state, in steps wide enough to survive rounding."""
+
+
 class Markers:
-    """Round dots of constant size on the screen, always seen: handles, pins, picked splats.
+    """Marks always seen: handles, pins, the pivot, the ends of axes. Later ones lie over earlier ones.
 
     Parameters
     ----------
@@ -45,28 +85,24 @@ class Markers:
         """Leave the renderer."""
         self._renderer.RemoveActor(self.actor)
 
-    def show(self, points: ArrayLike, colors: ArrayLike, active: int | None = None) -> None:
-        """Put a dot at each world point (N, 3) in its colour (N, 3), 0..1; the ``active`` one is rimmed white."""
-        points = np.asarray(points, np.float64).reshape(-1, 3)
-        rgb = np.asarray(colors, np.float64).reshape(-1, 3)
-        if len(rgb) != len(points):
-            raise ValueError(f"colors must have shape ({len(points)}, 3), got {rgb.shape}")
+    def show(self, marks: Sequence[Mark]) -> None:
+        """Show these marks in place of those before."""
         self.clear()
-        if not len(points):
+        if not marks:
             return
+        points = np.array([mark.at for mark in marks], np.float64)
         self.actor.SetPosition(*points[0])
         vtk_points = vtkPoints()
         vtk_points.SetData(numpy_to_vtk((points - points[0]).astype(np.float32), deep=True))
-        rgba = np.column_stack([np.rint(rgb * 255.0), np.full(len(rgb), 160.0)]).astype(np.uint8)
-        if active is not None:
-            rgba[active, 3] = 255
+        codes = [_CODE_STEP * (1 + 3 * mark.shape + mark.is_chosen + mark.is_active) for mark in marks]
+        rgba = np.array([(*mark.color, code) for mark, code in zip(marks, codes, strict=True)], np.uint8)
         self._poly.SetPoints(vtk_points)
         self._poly.GetPointData().SetScalars(numpy_to_vtk(rgba, deep=True))
         self._poly.SetVerts(cells_of(np.array([len(points)])))
         self.actor.VisibilityOn()
 
     def clear(self) -> None:
-        """Show no dots."""
+        """Show no marks."""
         self.actor.VisibilityOff()
 
     def set_size(self, diameter_px: float) -> None:

@@ -13,23 +13,23 @@ from splap_editor.core.reach_options import ReachOptions
 from splap_editor.core.splats.rotations import quats_to_matrices
 from splap_editor.core.splats.spherical_harmonics import view_colors
 from splap_editor.core.splats.splats import Splats
-from splap_editor.engine.edit import Handle
+from splap_editor.engine.edit import PIN_COLOR, Handle
 from splap_editor.session.depictor import HandOver
 from splap_editor.session.jobs import Job
 from splap_editor.session.latest_job import LatestJob
+from splap_editor.session.pivot import Pivot, pivot_point
 from splap_editor.session.scene import Scene
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.viewport.depth_order import depth_order
 from splap_editor.viewport.glyphs import Glyphs, base_colors, splat_glyphs
-from splap_editor.viewport.overlays import circle
+from splap_editor.viewport.overlays import Mark, MarkShape, circle
 from splap_editor.viewport.projection import Projection
 from splap_editor.viewport.splat_actor import DisplayMode, SplatFlag
+from splap_editor.viewport.tints import edit_tints, fixed_tint, pin_rows, rgb
 from splap_editor.viewport.viewport import Viewport
 from splap_editor.viewport.weight_view import WeightView
 
-FIXED_TINT = (46, 49, 58, 150)
-HANDLE_SHARE = 165
 FREE_RING_COLOR = (0.75, 0.77, 0.82)
 
 
@@ -125,6 +125,7 @@ class SceneView:
         self._presented: tuple[AdaptedKernels | None, Presented | None] = (None, None)
         self.preferred_up: tuple[float, float, float] | None = None
         self._shows_tints = True
+        self._fixed_tint = "auto"
         self._tinted_for: tuple[object, ...] = ()
         self._paints: dict[str, NDArray[np.uint8]] = {}
         self._marks: tuple[tuple[FileRows, tuple[int, int, int, int]], ...] = ()
@@ -141,6 +142,7 @@ class SceneView:
             edit_changed=self._show_handles,
             preview_changed=self._show_handles,
             active_handles_changed=self._show_handles,
+            pivot_changed=self._show_handles,
         )
         session.state_changed.connect(self._show_tints)
         self.weights = WeightView(session, viewport, self.paint)
@@ -161,6 +163,16 @@ class SceneView:
     @shows_tints.setter
     def shows_tints(self, on: bool) -> None:
         self._shows_tints = on
+        self._show_tints()
+
+    @property
+    def fixed_tint(self) -> str:
+        """How what cannot move is tinted: a name of `FIXED_TINTS`."""
+        return self._fixed_tint
+
+    @fixed_tint.setter
+    def fixed_tint(self, name: str) -> None:
+        self._fixed_tint = name
         self._show_tints()
 
     def paint(self, colors: NDArray[np.uint8] | None, layer: str = "weights") -> None:
@@ -194,6 +206,11 @@ class SceneView:
         labels = [i for i, handle in enumerate(bound.edit.active_handles) if handle.handle_id in wanted]
         nodes = bound.handles.indices[np.isin(bound.handles.labels, labels)]
         return self._scene.ellipses.rows[nodes]
+
+    def rows_of_pins(self, pin_ids: Iterable[int]) -> FileRows:
+        """File rows that these pins hold."""
+        rows = [pin_rows(self._scene, self._scene.edit.pin(pin_id)) for pin_id in pin_ids]
+        return np.concatenate(rows) if rows else np.empty(0, np.int64)
 
     def show_free_ring(self, is_shown: bool) -> None:
         """Draw the free radius about each active handle, facing the viewer."""
@@ -280,14 +297,26 @@ class SceneView:
             return
         scene, viewport = self._scene, self.viewport
         handles = scene.shown_edit.active_handles
-        centers = np.array([_center(handle) for handle in handles]).reshape(-1, 3)
-        colors = np.array([_rgb(handle.color) for handle in handles]).reshape(-1, 3) / 255.0
-        active = [i for i, handle in enumerate(handles) if handle.handle_id in scene.active_handles]
-        viewport.markers.show(centers, colors, active[-1] if active else None)
+        viewport.markers.show(self._marks_of_edit())
         if viewport.gizmo.dragged is None:
-            self._place_gizmo([handles[i] for i in active])
+            chosen = {handle.handle_id: handle for handle in handles}
+            self._place_gizmo([chosen[handle_id] for handle_id in scene.active_handles if handle_id in chosen])
         self._show_tints()
         viewport.gizmo_changed()
+
+    def _marks_of_edit(self) -> list[Mark]:
+        """Marks of pins and handles, the active one on top, and of the placed pivot."""
+        scene, marks = self._scene, []
+        for pin in scene.edit.pins:
+            is_chosen = pin.pin_id in scene.active_pins
+            marks.append(Mark(pin.region.center, rgb(PIN_COLOR), MarkShape.SQUARE, is_chosen=is_chosen))
+        for handle in scene.shown_edit.active_handles:
+            is_chosen, is_active = handle.handle_id in scene.active_handles, handle.handle_id == scene.active_handle
+            marks.append(Mark(handle.moved_center, rgb(handle.color), is_chosen=is_chosen, is_active=is_active))
+        marks.sort(key=lambda mark: (mark.is_chosen, mark.is_active))
+        if scene.pivot is Pivot.POINT and scene.pivot_at is not None:
+            marks.append(Mark(scene.pivot_at, (255, 255, 255), MarkShape.CROSS))
+        return marks
 
     def _place_gizmo(self, handles: list[Handle]) -> None:
         if not handles:
@@ -295,7 +324,7 @@ class SceneView:
             return
         frame = np.eye(4)
         frame[:3, :3] = quats_to_matrices(np.array([handles[-1].pose.rotate]))[0]
-        frame[:3, 3] = np.mean([_center(handle) for handle in handles], axis=0)
+        frame[:3, 3] = pivot_point(self._scene.pivot, self._scene.pivot_at, handles)
         self.viewport.gizmo.attach(frame)
 
     def _show_tints(self) -> None:
@@ -304,9 +333,12 @@ class SceneView:
         if not self._is_shown:
             return
         paint = next(reversed(self._paints.values()), None)
-        colors = tuple(handle.color for handle in scene.edit.active_handles)
+        edit = scene.edit
+        colors = tuple(handle.color for handle in edit.active_handles)
         is_known = bound is not None and len(bound.edit.active_handles) == len(colors) > 0
-        wanted = (bound, colors) if self._shows_tints and is_known else ()
+        is_tinted = self._shows_tints and (is_known or bool(edit.pins))
+        regions = tuple(id(pin.region) for pin in edit.pins)
+        wanted = (bound if is_known else None, colors, regions, self._fixed_tint) if is_tinted else ()
         if paint is not None:
             wanted = ("painted",)
         if wanted == self._tinted_for:
@@ -315,23 +347,18 @@ class SceneView:
         if not wanted and not self._marks:
             self.viewport.splats.set_tints(None)
             return
-        tints = np.zeros((scene.splats.n_splats, 4), np.uint8) if paint is None else paint
-        if wanted and paint is None:
-            self._tint_handles(tints)
+        if paint is not None:
+            tints = paint
+        elif wanted:
+            fixed = fixed_tint(self._fixed_tint, self._depicted.colors)
+            tints = edit_tints(scene, bound if is_known else None, fixed)
+        else:
+            tints = np.zeros((scene.splats.n_splats, 4), np.uint8)
         if self._marks:
             tints = tints.copy()
             for marked, rgba in self._marks:
                 tints[marked] = rgba
         self.viewport.splats.set_tints(tints)
-
-    def _tint_handles(self, tints: NDArray[np.uint8]) -> None:
-        scene, bound = self._scene, self._session.bound
-        colors = [handle.color for handle in scene.edit.active_handles]
-        rows = scene.ellipses.rows[bound.handles.indices]
-        is_pinned = bound.handles.labels < 0
-        tints[rows[is_pinned]] = FIXED_TINT
-        palette = np.array([(*_rgb(color), HANDLE_SHARE) for color in colors], np.uint8)
-        tints[rows[~is_pinned]] = palette[bound.handles.labels[~is_pinned]]
 
     # Colours and order of a view ----------------------------------------------------------------------------------
 
@@ -372,14 +399,6 @@ class SceneView:
 
 def _rest_means(depicted: Depiction) -> NDArray[np.float32]:
     return np.ascontiguousarray(depicted.rest.means, np.float32)
-
-
-def _center(handle: Handle) -> NDArray[np.float64]:
-    return np.asarray(handle.region.center, np.float64) + handle.pose.translate
-
-
-def _rgb(color: str) -> tuple[int, int, int]:
-    return int(color[1:3], 16), int(color[3:5], 16), int(color[5:7], 16)
 
 
 def suggested_up(splats: Splats) -> tuple[float, float, float]:

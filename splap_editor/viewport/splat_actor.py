@@ -102,8 +102,8 @@ class SplatLook:
     rim: float = 0.8
     backface_tint: Tint = (0.25, 0.32, 0.55, 0.0)
     ghost_tint: Tint = (0.0, 0.0, 0.0, 0.0)
-    select_tint: Tint = (1.0, 0.62, 0.12, 0.62)
-    hover_tint: Tint = (1.0, 0.95, 0.70, 0.55)
+    select_tint: Tint = (0.28, 0.33, 1.0, 0.70)
+    hover_tint: Tint = (1.0, 0.98, 0.90, 0.65)
     coverage: float = 1.0
 
 

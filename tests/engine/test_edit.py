@@ -7,9 +7,12 @@ import numpy as np
 from splap_editor.core.arap.options import ArapOptions
 from splap_editor.core.bbw.options import BbwOptions
 from splap_editor.core.handle_nodes import Region
+from splap_editor.core.pose import Pose
 from splap_editor.core.reach_options import ReachOptions
 from splap_editor.core.splats.rotations import quats_to_matrices
-from splap_editor.engine.edit import Edit, Handle, Pose, binds_like, poses_like
+from splap_editor.engine.edit import Edit, Handle, Pin, binds_like, poses_like
+from splap_editor.engine.recipe_edit import edit_of, recipe_of
+from tests.core.splat_scenes import sheet
 
 
 def similarity(rng):
@@ -49,6 +52,24 @@ def test_an_edit_never_changes():
     assert posed.handle(1).region is edit.handle(1).region
     assert posed.without_handles([1]).handles == ()
     assert edit.next_handle_id() == 2
+
+
+def test_pins_are_found_changed_and_dropped_one_by_one():
+    first, second = (Pin(i, f"Pin {i}", Region(np.zeros(3), 0.1)) for i in (1, 2))
+    edit = Edit().with_pin(first).with_pin(second)
+    renamed = edit.with_pin(replace(first, name="foot"))
+    assert [pin.name for pin in renamed.pins] == ["foot", "Pin 2"] and edit.pin(1) is first
+    assert binds_like(edit, renamed), "a name holds nothing"
+    assert not binds_like(edit, edit.with_pin(replace(first, region=Region(np.zeros(3), 0.2))))
+    assert renamed.without_pins([1]).pins == (second,) and renamed.next_pin_id() == 3
+
+
+def test_only_names_that_were_given_are_in_the_recipe():
+    pins = (Pin(1, "Pin 1", Region(np.zeros(3), 0.1)), Pin(5, "foot", Region(np.ones(3), 0.2)))
+    recipe = recipe_of(Edit(pins=pins))
+    assert [spec.name for spec in recipe.pins] == ["", "foot"]
+    again = edit_of(recipe, sheet(9))
+    assert [(pin.pin_id, pin.name, pin.reach) for pin in again.pins] == [(1, "Pin 1", 0.1), (2, "foot", 0.2)]
 
 
 def test_a_pose_change_needs_no_new_binding():

@@ -11,6 +11,7 @@ from splap_editor.core.arap.options import ArapOptions
 from splap_editor.core.graph.splat_graph import GraphOptions
 from splap_editor.core.handle_nodes import Region
 from splap_editor.core.options import OptionSet
+from splap_editor.core.pose import Pose
 from splap_editor.core.progress import Cancelled
 from splap_editor.core.reach_options import ReachOptions
 from splap_editor.core.splats.rotations import quats_to_matrices
@@ -18,7 +19,7 @@ from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.bound_edit import bind
 from splap_editor.engine.bound_edit import posed as posed_file
 from splap_editor.engine.cache import StageCache
-from splap_editor.engine.edit import Edit, Handle, Pose
+from splap_editor.engine.edit import Edit, Handle, Pin
 from splap_editor.engine.recipe_edit import edit_of, recipe_of
 from splap_editor.engine.scripting import write_posed
 from splap_editor.engine.surface import surface_of
@@ -59,7 +60,7 @@ def end_edit(splats, **changes) -> Edit:
     reach = 0.1 * float(np.ptp(means[:, axis]))
     lift = np.roll([0.0, 3.0 * reach, 0.0], axis)
     handle = Handle(1, "end", "#ffffff", Region(means[means[:, axis].argmax()], reach), Pose(tuple(lift.tolist())))
-    pins = (Region(means[means[:, axis].argmin()], reach),)
+    pins = (Pin(1, "rest", Region(means[means[:, axis].argmin()], reach)),)
     return replace(Edit(handles=(handle,), pins=pins, options=FREED), **changes)
 
 
@@ -132,7 +133,9 @@ def test_moving_the_whole_scene_moves_the_result(splats, surface, seed):
                 pose=Pose(tuple((rotation @ np.array(handle.pose.translate)).tolist())),
             ),
         ),
-        pins=tuple(Region(rotation @ pin.center + shift, pin.radius) for pin in edit.pins),
+        pins=tuple(
+            replace(pin, region=Region(rotation @ pin.region.center + shift, pin.region.radius)) for pin in edit.pins
+        ),
         options=FREED,
     )
     here, there = posed(surface, splats, edit), posed(other, elsewhere, moved)
@@ -248,7 +251,7 @@ def test_what_is_pinned_stays_the_files_own_and_nothing_outruns_its_handle(splat
     handle = Handle(1, "one", "#ffffff", Region(center, 0.0, np.flatnonzero(near)), Pose((0.0, 0.0, shift)))
     edit = Edit(
         handles=(handle,),
-        pins=(Region(center, 0.0, np.flatnonzero(~near)),),
+        pins=(Pin(1, "rest", Region(center, 0.0, np.flatnonzero(~near))),),
         method="bbw" if kind == "bbw" else "arap",
         options=OptionSet(ArapOptions() if kind == "bbw" else ArapOptions(kind=kind), AdaptationOptions(adaptation)),
     )

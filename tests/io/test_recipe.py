@@ -98,6 +98,16 @@ def test_null_frees_everything():
     assert recipe.handles[0].cage_radius is None
 
 
+def test_a_pin_may_have_a_name():
+    recipe = Recipe(pins=(PinSpec((0.0, 0.0, 1.0), 0.5, name="foot"), PinSpec(rows=(1, 2))))
+    held = recipe_to_json(recipe)
+    assert [pin.get("name") for pin in held["pins"]] == ["foot", None]
+    assert recipe_from_json(held) == recipe
+    held["pins"][0]["name"] = 3
+    with pytest.raises(RecipeError, match=r"pins\[0\]\.name"):
+        recipe_from_json(held)
+
+
 def test_the_documented_recipe_is_read():
     text = """
     {"version": 1, "method": "bbw", "graph": {"rule": "paper", "epsilon": 0.005, "k": 30, "cut": [[1, 2]], "add": []},

@@ -20,7 +20,15 @@ from splap_editor.io.session_file import (
     session_to_json,
     write_session_file,
 )
-from splap_editor.io.session_specs import HandleSettings, KeySpec, PlySpec, SessionFile, TimelineSpec, ViewSpec
+from splap_editor.io.session_specs import (
+    HandleSettings,
+    KeySpec,
+    PinSettings,
+    PlySpec,
+    SessionFile,
+    TimelineSpec,
+    ViewSpec,
+)
 
 MASKS = ("selection", "hidden")
 
@@ -38,10 +46,12 @@ def full_session(n=1003) -> SessionFile:
                 HandleSpec("arm", (0.1, 0.2, 0.3), 0.25, translate=(1e-300, 2.0, 3.0)),
                 HandleSpec("leg", (1.0, 2.0, 3.0), rows=(4, 9, 1002), rotate=(0.0, 1.0, 0.0, 0.0), scale=1.5),
             ),
-            pins=(PinSpec(rows=(0, 1)),),
+            pins=(PinSpec(rows=(0, 1)), PinSpec((1.0, 0.0, 0.0), 0.5, name="foot")),
         ),
         (HandleSettings(7, "#ff0001"), HandleSettings(3, "#00ff02", False)),
+        (PinSettings(4), PinSettings(2, 0.5)),
         (3,),
+        (2, 4),
         TimelineSpec((KeySpec(1, {7: turn, 3: Pose()}), KeySpec(30, {3: turn})), 12, 48, 29.97, False, False),
         ViewSpec((1.0, 2.0, 1 / 3), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 28.0, True, False, (0.0, -1.0, 0.0)),
         {"mode": "points", "size_factor": 0.3, "tints": False, "n": 3},
@@ -74,6 +84,15 @@ def test_a_session_comes_back_exactly(tmp_path, n):
     assert (tmp_path / "a.splap").read_bytes() == (tmp_path / "b.splap").read_bytes()
 
 
+def test_a_session_from_before_pins_had_ids_opens():
+    held = session_to_json(full_session())
+    for key in ("pins", "active_pins"):
+        del held[key]
+    del held["recipe"]["pins"][1]["name"]
+    session = session_from_json(held)
+    assert session.pins == () and session.active_pins == () and len(session.recipe.pins) == 2
+
+
 def test_an_empty_session_comes_back_exactly(tmp_path):
     session = SessionFile(PlySpec("a.ply", "", 0))
     write_session_file(tmp_path / "a.splap", session)
@@ -104,6 +123,9 @@ def changed(path, value):
         (["recipe", "version"], 9, "recipe: version"),
         (["handles"], [], "handles must name each of the 2"),
         (["handles", 0, "id"], 3, "handles must name each"),
+        (["pins"], [{"id": 1}], "pins must name each of the 2"),
+        (["pins", 0, "id"], 2, "pins must name each"),
+        (["pins", 1, "reach"], 0, "reach"),
         (["handles", 0, "color"], "red", "a colour"),
         (["handles", 0, "enabled"], 1, "true or false"),
         (["timeline", "frame"], 0, r"timeline\.frame"),

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from splap_editor.core.handle_nodes import Region
-from splap_editor.engine.edit import Pose
+from splap_editor.core.pose import Pose
 from splap_editor.engine.keyframes import edit_at_frame, keyed_edit
 from splap_editor.io.session_file import SessionFileError, read_session_file
 from splap_editor.io.session_specs import ViewSpec
@@ -98,8 +98,9 @@ def assert_same_edit(a, b):
     assert [(h.handle_id, h.name, h.color, h.pose, h.enabled) for h in a.handles] == [
         (h.handle_id, h.name, h.color, h.pose, h.enabled) for h in b.handles
     ]
-    regions = zip((*(h.region for h in a.handles), *a.pins), (*(h.region for h in b.handles), *b.pins), strict=True)
-    for left, right in regions:
+    assert [(p.pin_id, p.name, p.reach) for p in a.pins] == [(p.pin_id, p.name, p.reach) for p in b.pins]
+    for held, again in zip((*a.handles, *a.pins), (*b.handles, *b.pins), strict=True):
+        left, right = held.region, again.region
         np.testing.assert_array_equal(left.center, right.center)
         np.testing.assert_array_equal(left.rows, right.rows)
         assert left.rows is not None or left.radius == right.radius

@@ -96,3 +96,16 @@ def test_distance_along_the_surface_counts_from_the_picked_splat(driver, picked,
     quantities.set(name="geodesic")
     qtbot.waitUntil(lambda: quantities.shown is not None, timeout=WAIT_MS)
     assert quantities.shown.values[driver.scene.picked] == 0.0
+
+
+def test_the_card_opens_where_it_can_be_seen(driver):
+    panel, scroll = driver.window.inspection.inspect_panel, driver.window.dock.widget()
+    driver.key(Qt.Key.Key_I)
+    scroll.verticalScrollBar().setValue(0)
+    driver.click(driver.surface_pixel())
+
+    def is_seen():
+        top = panel.splat.mapTo(scroll.viewport(), QPoint(0, 0)).y()
+        return panel.splat.text() and top >= 0 and top + panel.splat.height() <= scroll.viewport().height()
+
+    driver.qtbot.waitUntil(is_seen, timeout=WAIT_MS)

@@ -10,8 +10,8 @@ from PySide6.QtWidgets import QApplication, QLabel
 
 from splap_editor.core.arap.options import ArapOptions
 from splap_editor.core.handle_nodes import Region
+from splap_editor.core.pose import Pose
 from splap_editor.core.reach_options import ReachOptions
-from splap_editor.engine.edit import Pose
 from splap_editor.ui.panels.pose_form import PoseForm, euler_degrees, quat_of_euler
 from splap_editor.ui.widgets.number_field import NumberField, ScrubLabel
 from splap_editor.ui.widgets.options_form import OptionsForm
@@ -88,7 +88,7 @@ def test_an_options_form_gives_a_changed_copy(qtbot):
 def test_handle_list_renames_switches_resets_and_deletes(driver):
     session, panel = driver.session, driver.window.handles_panel
     session.add_handle(Region(driver.scene.ellipses.centers[0], 0.1), pose=Pose((0.0, 0.0, 0.1)))
-    row = panel._rows[1]
+    row = panel.handle_rows[1]
     row.name.setText("Left end")
     row.name.editingFinished.emit()
     assert driver.scene.edit.handles[0].name == "Left end"

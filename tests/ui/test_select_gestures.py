@@ -82,7 +82,7 @@ def test_a_selection_becomes_a_handle_or_a_pin(driver, key, n_handles, n_pins):
     driver.key(key)
     edit = driver.scene.edit
     assert (len(edit.handles), len(edit.pins)) == (n_handles, n_pins)
-    region = [*(handle.region for handle in edit.handles), *edit.pins][0]
+    region = [*(handle.region for handle in edit.handles), *(pin.region for pin in edit.pins)][0]
     np.testing.assert_array_equal(region.rows, rows)
     driver.wait_idle()
 
@@ -93,7 +93,7 @@ def test_everything_else_is_pinned_in_one_action(driver):
     others = np.flatnonzero(~driver.scene.selection)
     driver.key(Qt.Key.Key_P, Qt.KeyboardModifier.ShiftModifier)
     (pin,) = driver.scene.edit.pins
-    np.testing.assert_array_equal(pin.rows, others)
+    np.testing.assert_array_equal(pin.region.rows, others)
     driver.session.history.undo()
     assert not driver.scene.edit.pins
     driver.wait_idle()

@@ -6,7 +6,7 @@ from vtkmodules.vtkRenderingCore import vtkRenderer
 
 from splap_editor.viewport.edge_lines import edges_within_hops
 from splap_editor.viewport.gizmo_parts import DOT
-from splap_editor.viewport.overlays import circle
+from splap_editor.viewport.overlays import Mark, circle
 from splap_editor.viewport.screenshot import screenshot
 from splap_editor.viewport.splat_actor import DisplayMode, SplatLook
 from splap_editor.viewport.splat_scene import Compare
@@ -170,7 +170,7 @@ def test_marks_are_drawn_over_the_splats_and_taken_away_again():
     with canvas(glyphs, rgba) as viewport:
         before = drawn(viewport)
         behind = np.array([-0.5, 3.0, -0.4])
-        viewport.markers.show([behind], [(1.0, 0.0, 1.0)], active=0)
+        viewport.markers.show([Mark(behind, (255, 0, 255), is_chosen=True, is_active=True)])
         x, y = viewport.projection.pixel(behind).astype(int)
         np.testing.assert_allclose(drawn(viewport)[y, x], [1.0, 0.0, 1.0], atol=0.02)
         viewport.markers.clear()

@@ -85,6 +85,11 @@ def has_active_handles(state: State) -> bool:
     return state.scene is not None and bool(state.scene.active_handles)
 
 
+def has_chosen(state: State) -> bool:
+    """Handles or pins are chosen."""
+    return has_active_handles(state) or (state.scene is not None and bool(state.scene.active_pins))
+
+
 def has_pins(state: State) -> bool:
     """Something is pinned."""
     return state.scene is not None and bool(state.scene.edit.pins)

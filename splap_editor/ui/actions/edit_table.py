@@ -1,10 +1,14 @@
 """The actions that change selection, handles and poses, with undo and redo."""
 
+from functools import partial
+
+from splap_editor.session.pivot import Pivot
 from splap_editor.ui.actions.action_spec import ActionSpec
 from splap_editor.ui.actions.conditions import (
     can_redo,
     can_undo,
     has_active_handles,
+    has_chosen,
     has_handles,
     has_hidden,
     has_pins,
@@ -232,8 +236,8 @@ EDIT_TABLE: tuple[ActionSpec, ...] = (
         "&Delete",
         ("Delete", "Backspace"),
         icon="trash",
-        tip="Delete the chosen handles.",
-        needs=has_active_handles,
+        tip="Delete the chosen handles and pins.",
+        needs=has_chosen,
         menu="Ha&ndle",
     ),
     A(
@@ -287,6 +291,45 @@ EDIT_TABLE: tuple[ActionSpec, ...] = (
         tip="Find the plane that the object is mirrored about, and pose the handle opposite.",
         needs=has_active_handles,
         menu="Ha&ndle/&Mirror",
+    ),
+    A(
+        "handle.pivot_median",
+        partial(HandleActions.pivot, pivot=Pivot.MEDIAN),
+        "&Middle of the chosen",
+        tip="Several handles turn and scale about the point between them.",
+        needs=has_scene,
+        menu="Ha&ndle/Pi&vot",
+        group="pivot",
+        checkable=True,
+    ),
+    A(
+        "handle.pivot_active",
+        partial(HandleActions.pivot, pivot=Pivot.ACTIVE),
+        "&Active handle",
+        tip="Several handles turn and scale about the one chosen last.",
+        needs=has_scene,
+        menu="Ha&ndle/Pi&vot",
+        group="pivot",
+        checkable=True,
+    ),
+    A(
+        "handle.pivot_point",
+        partial(HandleActions.pivot, pivot=Pivot.POINT),
+        "&Placed point",
+        tip="Handles turn and scale about a point; Shift + right click on the surface places it.",
+        needs=has_scene,
+        menu="Ha&ndle/Pi&vot",
+        group="pivot",
+        checkable=True,
+    ),
+    A(
+        "handle.next_pivot",
+        HandleActions.next_pivot,
+        "&Next pivot",
+        (".",),
+        tip="What the chosen handles turn about: the middle, the active one, a placed point.",
+        needs=has_scene,
+        menu="Ha&ndle/Pi&vot",
     ),
     A(
         "handle.local",

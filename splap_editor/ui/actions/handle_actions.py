@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from splap_editor.core.pose import Pose
+from splap_editor.session.pivot import Pivot
 from splap_editor.session.placement import rows_region
 from splap_editor.session.session import Session
 from splap_editor.viewport.viewport import Viewport
@@ -45,11 +46,21 @@ class HandleActions:
         self._reset(tuple(handle.handle_id for handle in scene.edit.handles), "Reset all poses")
 
     def delete(self) -> None:
-        """Delete the chosen handles."""
+        """Delete the chosen handles and pins."""
         scene = self._session.scene
-        n = len(scene.active_handles)
-        label = "Delete handle" if n == 1 else f"Delete {n} handles"
-        self._session.change_edit(scene.edit.without_handles(scene.active_handles), label)
+        handles, pins = scene.active_handles, scene.active_pins
+        counts = ((len(handles), "handle"), (len(pins), "pin"))
+        what = " and ".join(f"{n} {noun}s" if n > 1 else noun for n, noun in counts if n)
+        self._session.change_edit(scene.edit.without_handles(handles).without_pins(pins), f"Delete {what}")
+
+    def pivot(self, pivot: Pivot) -> None:
+        """Choose what handles turn and scale about."""
+        self._session.scene.set_pivot(pivot)
+
+    def next_pivot(self) -> None:
+        """Choose the next of them."""
+        pivots = list(Pivot)
+        self.pivot(pivots[(pivots.index(self._session.scene.pivot) + 1) % len(pivots)])
 
     def local(self, on: bool) -> None:
         """Turn the gizmo with the handle."""

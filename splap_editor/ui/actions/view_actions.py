@@ -52,11 +52,12 @@ class ViewActions(QObject):
         self._viewport.camera_moved()
 
     def frame_selection(self) -> None:
-        """Fly to the selection, else to the chosen handles, else to the main subject."""
+        """Fly to the selection, else to the chosen handles and pins, else to the main subject."""
         scene = self._session.scene
         rows = np.flatnonzero(scene.selection & ~scene.hidden)
         if not len(rows):
-            rows = self._view.rows_of_handles(scene.active_handles)
+            held = (self._view.rows_of_handles(scene.active_handles), self._view.rows_of_pins(scene.active_pins))
+            rows = np.concatenate(held)
         if len(rows):
             self.fly_to(self._viewport.frame(rows))
         else:

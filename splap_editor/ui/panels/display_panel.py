@@ -20,7 +20,19 @@ HINTS = {
     "background": FieldHint(
         "Background", choices={"dark": "Dark", "grey": "Middle grey", "light": "Light", "black": "Black"}
     ),
-    "tints": FieldHint("Show what is free and what is fixed", "Handles in their colours; what stays put is darker."),
+    "tints": FieldHint("Show what is free and what is fixed", "Handles and pins in their colours; the rest as below."),
+    "fixed": FieldHint(
+        "What is fixed",
+        "How splats look that cannot move: too far from every handle.",
+        choices={
+            "auto": "Darker, or lighter on a dark object",
+            "darker": "Darker",
+            "lighter": "Lighter",
+            "blue": "Blue",
+            "none": "As it is",
+        },
+        only_for=("tints", (True,)),
+    ),
 }
 
 
@@ -54,7 +66,7 @@ class DisplayPanel(QWidget):
             self.sliders[name], self.fields[name] = slider, field
         layout.addLayout(grid)
         self.form = OptionsForm(display.options, HINTS)
-        self.form.changed.connect(lambda options: display.set(background=options.background, tints=options.tints))
+        self.form.changed.connect(lambda options: display.set(**{name: getattr(options, name) for name in HINTS}))
         layout.addWidget(self.form)
         display.changed.connect(self._show)
         self._show()

@@ -1,31 +1,38 @@
-"""The list of handles, and the pose of the chosen one in numbers."""
+"""The list of handles and pins, and the numbers of the chosen one."""
 
 from dataclasses import replace
 
-from PySide6.QtCore import QSize, Qt
-from PySide6.QtGui import QColor, QMouseEvent
-from PySide6.QtWidgets import (
-    QCheckBox,
-    QColorDialog,
-    QFrame,
-    QHBoxLayout,
-    QLineEdit,
-    QPushButton,
-    QToolButton,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import QFrame, QGridLayout, QScrollArea, QVBoxLayout, QWidget
 
+from splap_editor.core.handle_nodes import region_nodes
 from splap_editor.core.options import world_length
 from splap_editor.core.pose import Pose
-from splap_editor.engine.edit import Handle
+from splap_editor.core.reach_options import CageOptions
+from splap_editor.engine.edit import Handle, Pin
+from splap_editor.session.pivot import Pivot
+from splap_editor.session.placement import pin_with_reach
 from splap_editor.session.scene import Scene
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
+from splap_editor.tools.transform_tool import toggled
 from splap_editor.ui.panels.cage_form import CageForm
+from splap_editor.ui.panels.handle_rows import HandleRow, ListRow, PinRow
 from splap_editor.ui.panels.pose_form import PoseForm
-from splap_editor.ui.theme import STEP, icon
+from splap_editor.ui.theme import STEP
+from splap_editor.ui.widgets.choices import Choice
+from splap_editor.ui.widgets.number_field import NumberField
+from splap_editor.ui.widgets.options_form import form_label
 from splap_editor.ui.widgets.plain_text import PlainLabel
+
+LIST_PX = 156
+"""Height of the list, whatever is in it: what stands below does not jump."""
+
+PIVOTS = {
+    Pivot.MEDIAN: "The middle of the chosen",
+    Pivot.ACTIVE: "The active handle",
+    Pivot.POINT: "A placed point",
+}
 
 
 class HandlesPanel(QWidget):
@@ -35,95 +42,168 @@ class HandlesPanel(QWidget):
         super().__init__(parent)
         self._session = session
         self._scene: Scene | None = None
-        self._rows: dict[int, HandleRow] = {}
-        self._empty = PlainLabel(
-            "Pick the Handle tool and click the surface, or select splats and press H.", wordWrap=True
-        )
-        self._empty.setProperty("tone", "quiet")
-        self._list = QVBoxLayout()
-        self._list.setSpacing(0)
+        self.handle_rows: dict[int, HandleRow] = {}
+        self.pin_rows: dict[int, PinRow] = {}
+        self._counted: dict[int, tuple[object, int]] = {}
+        self.list = self._made_list()
         self.pose_form = PoseForm()
         self.pose_form.changed.connect(self._on_pose_changed)
         self.pose_form.previewed.connect(lambda pose: self._preview(pose))
         self.cage_form = CageForm()
         self.cage_form.changed.connect(self._on_cage_changed)
-        self._pins = PlainLabel()
-        self._pins.setProperty("tone", "quiet")
-        self._clear_pins = QPushButton("Clear")
-        self._clear_pins.setFlat(True)
-        self._clear_pins.clicked.connect(lambda: self._change("Clear pins", pins=()))
-        pins = QHBoxLayout()
-        pins.addWidget(self._pins, 1)
-        pins.addWidget(self._clear_pins)
+        self.pivot = Choice(toolTip="What several handles turn and scale about; Shift + right click places the point.")
+        for pivot, words in PIVOTS.items():
+            self.pivot.addItem(words, pivot)
+        self.pivot.activated.connect(lambda index: self._scene and self._scene.set_pivot(self.pivot.itemData(index)))
+        self.pin_reach = NumberField(1e-6, 1e9, decimals=4, step=0.01)
+        self.pin_reach.setToolTip("Radius on the surface of what the chosen pin holds.")
+        self.pin_reach.committed.connect(self._on_reach_changed)
+        grid = QGridLayout()
+        grid.setHorizontalSpacing(2 * STEP)
+        grid.setVerticalSpacing(STEP)
+        grid.setColumnStretch(1, 1)
+        for row, (text, field) in enumerate((("Turn about", self.pivot), ("Pin's reach", self.pin_reach))):
+            grid.addWidget(form_label(text, field), row, 0)
+            grid.addWidget(field, row, 1)
         layout = QVBoxLayout(self)
         layout.setSpacing(2 * STEP)
-        layout.addWidget(self._empty)
-        layout.addLayout(self._list)
+        layout.addWidget(self.list)
         layout.addWidget(self.pose_form)
+        layout.addLayout(grid)
         layout.addWidget(self.cage_form)
-        layout.addLayout(pins)
         SceneFollower(
             session,
             self._on_scene_changed,
             edit_changed=self._show,
             preview_changed=self._show_pose,
             active_handles_changed=self._show_active,
+            pivot_changed=self._show_pivot,
         )
         self._show()
 
+    def _made_list(self) -> QScrollArea:
+        self._empty = PlainLabel(
+            "Click the surface with the Handle tool to move a place, with the Pin tool to hold one; or select splats "
+            "and press H or P.",
+            wordWrap=True,
+        )
+        self._empty.setProperty("tone", "quiet")
+        page = QWidget()
+        self._lines = QVBoxLayout(page)
+        self._lines.setContentsMargins(0, 0, 0, 0)
+        self._lines.setSpacing(0)
+        self._lines.addWidget(self._empty)
+        self._lines.addStretch(1)
+        scroll = QScrollArea(widgetResizable=True)
+        scroll.setObjectName("handleList")
+        scroll.setFrameShape(QFrame.Shape.NoFrame)
+        scroll.setFixedHeight(LIST_PX)
+        scroll.setWidget(page)
+        return scroll
+
+    # ------------------------------------------------------------------ showing
+
     def _on_scene_changed(self) -> None:
         self._scene = self._session.scene
+        self._counted = {}
         self._show()
+        self._show_pivot()
 
     def _show(self) -> None:
-        handles = self._scene.edit.handles if self._scene is not None else ()
-        if [handle.handle_id for handle in handles] != list(self._rows):
-            self._build_rows(handles)
+        edit = self._scene.edit if self._scene is not None else None
+        handles, pins = (edit.handles, edit.pins) if edit is not None else ((), ())
+        ids = [handle.handle_id for handle in handles], [pin.pin_id for pin in pins]
+        if ids != (list(self.handle_rows), list(self.pin_rows)):
+            self._build_rows(*ids)
         for handle in handles:
-            self._rows[handle.handle_id].show_handle(handle)
-        n_pins = len(self._scene.edit.pins) if self._scene is not None else 0
-        self._pins.setText(f"{n_pins} pinned region{'s' if n_pins != 1 else ''}")
-        self._pins.setVisible(n_pins > 0)
-        self._clear_pins.setVisible(n_pins > 0)
-        self._empty.setVisible(not handles)
+            self.handle_rows[handle.handle_id].show_handle(handle)
+        for pin in pins:
+            self.pin_rows[pin.pin_id].show_pin(pin, self._n_splats(pin))
+        self._empty.setVisible(not handles and not pins)
         self._show_active()
 
+    def _n_splats(self, pin: Pin) -> int:
+        """Count what a pin holds, once for each region it has."""
+        region, n = self._counted.get(pin.pin_id, (None, 0))
+        if region is not pin.region:
+            n = len(region_nodes(pin.region, self._scene.ellipses))
+            self._counted[pin.pin_id] = (pin.region, n)
+        return n
+
     def _show_active(self) -> None:
-        chosen = self._scene.active_handles if self._scene is not None else ()
-        for handle_id, row in self._rows.items():
-            row.show_active(handle_id in chosen)
+        scene = self._scene
+        for rows, chosen in (
+            (self.handle_rows, scene.active_handles if scene is not None else ()),
+            (self.pin_rows, scene.active_pins if scene is not None else ()),
+        ):
+            for each_id, row in rows.items():
+                row.show_active(each_id in chosen, bool(chosen) and each_id == chosen[-1])
         self._show_pose()
+        pin = self._chosen_pin()
+        self.pin_reach.setEnabled(pin is not None and pin.reach is not None)
+        if scene is not None:
+            self.pin_reach.setSingleStep(0.005 * scene.ellipses.scene_scale)
+        if pin is not None and pin.reach is not None:
+            self.pin_reach.show_value(pin.reach)
 
     def _show_pose(self) -> None:
-        handle = self._chosen()
-        self.pose_form.setVisible(handle is not None)
+        handle, scene = self._chosen(), self._scene
+        unit = scene.ellipses.scene_scale if scene is not None else 1.0
+        self.pose_form.setEnabled(handle is not None)
+        self.pose_form.show_pose(handle.pose if handle is not None else Pose(), unit)
+        self.cage_form.setVisible(scene is not None and scene.edit.deformer.has_weights)
+        self.cage_form.setEnabled(handle is not None)
         if handle is not None:
-            self.pose_form.show_pose(handle.pose, self._scene.ellipses.scene_scale)
-        has_cage = handle is not None and self._scene.edit.deformer.has_weights
-        self.cage_form.setVisible(has_cage)
-        if has_cage:
-            radius = world_length(handle.cage_radius, self._scene.ellipses.scene_scale)
-            self.cage_form.show_radius(radius, self._scene.ellipses.scene_scale)
+            self.cage_form.show_radius(world_length(handle.cage_radius, unit), unit)
+        else:
+            self.cage_form.show_radius(world_length(CageOptions.cage_radius, unit), unit)
+
+    def _show_pivot(self) -> None:
+        self.pivot.setCurrentIndex(list(PIVOTS).index(self._scene.pivot))
 
     def _chosen(self) -> Handle | None:
         # The active ones may for a moment name a handle that an undo has just taken away.
-        chosen = self._scene.active_handles if self._scene is not None else ()
-        handles = [handle for handle in self._scene.shown_edit.handles if handle.handle_id in chosen] if chosen else []
-        return max(handles, key=lambda handle: chosen.index(handle.handle_id), default=None)
+        wanted = self._scene.active_handle if self._scene is not None else None
+        handles = self._scene.shown_edit.handles if wanted is not None else ()
+        return next((handle for handle in handles if handle.handle_id == wanted), None)
 
-    def _build_rows(self, handles: tuple[Handle, ...]) -> None:
-        for row in self._rows.values():
-            self._list.removeWidget(row)
+    def _chosen_pin(self) -> Pin | None:
+        chosen = self._scene.active_pins if self._scene is not None else ()
+        return next((pin for pin in self._scene.edit.pins if pin.pin_id == chosen[-1]), None) if chosen else None
+
+    def _build_rows(self, handle_ids: list[int], pin_ids: list[int]) -> None:
+        known = {*self.handle_rows}, {*self.pin_rows}
+        gone: list[ListRow] = [*self.handle_rows.values(), *self.pin_rows.values()]
+        for row in gone:
+            self._lines.removeWidget(row)
             row.hide()
             row.deleteLater()
-        self._rows = {handle.handle_id: HandleRow(handle.handle_id, self) for handle in handles}
-        for row in self._rows.values():
-            self._list.addWidget(row)
+        self.handle_rows = {handle_id: HandleRow(handle_id, self) for handle_id in handle_ids}
+        self.pin_rows = {pin_id: PinRow(pin_id, self) for pin_id in pin_ids}
+        made: list[ListRow] = [*self.handle_rows.values(), *self.pin_rows.values()]
+        for place, row in enumerate(made):
+            self._lines.insertWidget(place, row)
+        new = [self.handle_rows[each] for each in handle_ids if each not in known[0]]
+        new += [self.pin_rows[each] for each in pin_ids if each not in known[1]]
+        if len(new) == 1:
+            # Once it has its place.
+            QTimer.singleShot(0, new[0], lambda: self.list.ensureWidgetVisible(new[0], 0, 0))
 
-    def choose(self, handle_id: int, *, add: bool) -> None:
-        """Make a handle the active one, or add it to the active ones."""
-        others = tuple(h for h in self._scene.active_handles if h != handle_id) if add else ()
-        self._scene.set_active_handles((*others, handle_id))
+    # ------------------------------------------------------------------ changing
+
+    def choose_handle(self, handle_id: int, *, add: bool) -> None:
+        """Make a handle the active one, or one more of the chosen, or one less."""
+        if add:
+            self._scene.set_active_handles(toggled(self._scene.active_handles, handle_id), self._scene.active_pins)
+        else:
+            self._scene.set_active_handles((handle_id,))
+
+    def choose_pin(self, pin_id: int, *, add: bool) -> None:
+        """Choose a pin alone, or as one more, or one less."""
+        if add:
+            self._scene.set_active_handles(self._scene.active_handles, toggled(self._scene.active_pins, pin_id))
+        else:
+            self._scene.set_active_handles((), (pin_id,))
 
     def change_handle(self, handle_id: int, label: str, **values: object) -> None:
         """Change fields of a handle as one undoable step."""
@@ -131,12 +211,19 @@ class HandlesPanel(QWidget):
         if any(getattr(handle, name) != value for name, value in values.items()):
             self._session.change_edit(self._scene.edit.with_handle(replace(handle, **values)), label)
 
+    def change_pin(self, pin_id: int, label: str, **values: object) -> None:
+        """Change fields of a pin as one undoable step."""
+        pin = self._scene.edit.pin(pin_id)
+        if any(getattr(pin, name) != value for name, value in values.items()):
+            self._session.change_edit(self._scene.edit.with_pin(replace(pin, **values)), label)
+
     def delete_handle(self, handle_id: int) -> None:
         """Delete a handle as one undoable step."""
         self._session.change_edit(self._scene.edit.without_handles((handle_id,)), "Delete handle")
 
-    def _change(self, label: str, **values: object) -> None:
-        self._session.change_edit(replace(self._scene.edit, **values), label)
+    def delete_pin(self, pin_id: int) -> None:
+        """Delete a pin as one undoable step."""
+        self._session.change_edit(self._scene.edit.without_pins((pin_id,)), "Delete pin")
 
     def _preview(self, pose: Pose) -> None:
         self._session.preview_poses({self._scene.active_handles[-1]: pose})
@@ -156,71 +243,8 @@ class HandlesPanel(QWidget):
         if handle is not None:
             self.change_handle(handle.handle_id, "Change cage", cage_radius=radius)
 
-
-class HandleRow(QFrame):
-    """Swatch, name, switch, reset and delete of one handle; a click chooses it."""
-
-    def __init__(self, handle_id: int, panel: HandlesPanel) -> None:
-        super().__init__()
-        self.setObjectName("handleRow")
-        self._id = handle_id
-        self._panel = panel
-        self.swatch = QToolButton(toolTip="Colour", autoRaise=True)
-        self.swatch.setFixedSize(20, 20)
-        self.swatch.clicked.connect(self._on_swatch_clicked)
-        self.name = QLineEdit(toolTip="Rename")
-        self.name.setObjectName("nameField")
-        self.name.editingFinished.connect(self._on_renamed)
-        self.is_enabled = QCheckBox(toolTip="A switched-off handle neither moves nor holds anything")
-        self.is_enabled.clicked.connect(lambda on: panel.change_handle(self._id, "Switch handle", enabled=on))
-        self.reset = self._tool("reset", "Put it back to rest")
-        self.reset.clicked.connect(lambda: panel.change_handle(self._id, "Reset pose", pose=Pose()))
-        self.delete = self._tool("trash", "Delete")
-        self.delete.clicked.connect(lambda: panel.delete_handle(self._id))
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(STEP, 2, STEP, 2)
-        layout.setSpacing(STEP)
-        for part in (self.is_enabled, self.swatch):
-            layout.addWidget(part)
-        layout.addWidget(self.name, 1)
-        layout.addWidget(self.reset)
-        layout.addWidget(self.delete)
-
-    def show_handle(self, handle: Handle) -> None:
-        """Show a handle's name, colour and state."""
-        self._color = handle.color
-        self.swatch.setStyleSheet(
-            f"QToolButton {{ background: {handle.color}; border-radius: 7px; margin: 3px; padding: 0; }}"
-        )
-        if not self.name.hasFocus():
-            self.name.setText(handle.name)
-        self.is_enabled.setChecked(handle.enabled)
-        self.name.setEnabled(True)
-        self.reset.setEnabled(not handle.pose.is_identity)
-
-    def show_active(self, is_active: bool) -> None:
-        """Mark the row of an active handle."""
-        if self.property("active") != is_active:
-            self.setProperty("active", is_active)
-            self.style().unpolish(self)
-            self.style().polish(self)
-
-    def mousePressEvent(self, event: QMouseEvent) -> None:
-        """Choose the handle; with Shift or Ctrl as well."""
-        held = Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.ControlModifier
-        self._panel.choose(self._id, add=bool(event.modifiers() & held))
-
-    def _on_renamed(self) -> None:
-        self.name.clearFocus()
-        self._panel.change_handle(self._id, "Rename handle", name=self.name.text().strip() or f"Handle {self._id}")
-
-    def _on_swatch_clicked(self) -> None:
-        dialog = QColorDialog(QColor(self._color), self)
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.colorSelected.connect(
-            lambda color: self._panel.change_handle(self._id, "Colour handle", color=color.name())
-        )
-        dialog.open()
-
-    def _tool(self, name: str, tip: str) -> QToolButton:
-        return QToolButton(icon=icon(name), toolTip=tip, autoRaise=True, iconSize=QSize(16, 16))
+    def _on_reach_changed(self, reach: float) -> None:
+        pin = self._chosen_pin()
+        if pin is not None and pin.reach is not None and reach != pin.reach:
+            edit = self._scene.edit.with_pin(pin_with_reach(self._scene, pin, reach))
+            self._session.change_edit(edit, "Change reach of pin")

@@ -60,4 +60,11 @@ def bring_into_view(body: QWidget) -> None:
     while scroll is not None and not isinstance(scroll, QScrollArea):
         scroll = scroll.parentWidget()
     if scroll is not None:
-        QTimer.singleShot(0, scroll, lambda: scroll.ensureWidgetVisible(section, 0, 0))
+        QTimer.singleShot(0, scroll, lambda: _scroll_to(scroll, section))
+
+
+def _scroll_to(scroll: QScrollArea, section: Section) -> None:
+    """Bring the top of a section to the top, unless all of it is seen."""
+    bar, top = scroll.verticalScrollBar(), section.y()
+    if top < bar.value() or top + section.height() > bar.value() + scroll.viewport().height():
+        bar.setValue(top)

@@ -1,0 +1,179 @@
+"""Rows of the list of handles and pins."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtGui import QColor, QMouseEvent
+from PySide6.QtWidgets import QCheckBox, QColorDialog, QFrame, QHBoxLayout, QLineEdit, QToolButton, QWidget
+
+from splap_editor.core.pose import Pose
+from splap_editor.engine.edit import PIN_COLOR, Handle, Pin
+from splap_editor.ui.theme import STEP, icon
+from splap_editor.ui.widgets.plain_text import PlainLabel
+
+if TYPE_CHECKING:
+    from splap_editor.ui.panels.handles_panel import HandlesPanel
+
+_MORE = Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.ControlModifier
+
+
+class ListRow(QFrame):
+    """One line of the list: a click anywhere on it chooses what it stands for, with Shift or Ctrl as well.
+
+    Parameters
+    ----------
+    panel : HandlesPanel
+        Does what the row is asked.
+    """
+
+    def __init__(self, panel: HandlesPanel) -> None:
+        super().__init__()
+        self.setObjectName("handleRow")
+        self._panel = panel
+        self.name = NameField(self)
+        self.name.editingFinished.connect(self._on_renamed)
+        self.delete = tool_button("trash", "Delete")
+        self._layout = QHBoxLayout(self)
+        self._layout.setContentsMargins(STEP, 2, STEP, 2)
+        self._layout.setSpacing(STEP)
+
+    def lay_out(self, *before: QWidget, after: tuple[QWidget, ...] = ()) -> None:
+        """Put parts before and after the name; the bin is the last."""
+        for part in before:
+            self._layout.addWidget(part)
+        self._layout.addWidget(self.name, 1)
+        for part in (*after, self.delete):
+            self._layout.addWidget(part)
+
+    def show_active(self, is_chosen: bool, is_active: bool) -> None:
+        """Mark the row of what is chosen, and of the one chosen last."""
+        wanted = "last" if is_active else "yes" if is_chosen else "no"
+        if self.property("chosen") != wanted:
+            self.setProperty("chosen", wanted)
+            self.style().unpolish(self)
+            self.style().polish(self)
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Choose it."""
+        self.choose(add=bool(event.modifiers() & _MORE))
+
+    def choose(self, *, add: bool) -> None:
+        """Choose it, or one more."""
+        raise NotImplementedError
+
+    def rename(self, name: str) -> None:
+        """Take a name; empty for the usual one."""
+        raise NotImplementedError
+
+    def _on_renamed(self) -> None:
+        self.name.clearFocus()
+        self.rename(self.name.text().strip())
+
+
+class NameField(QLineEdit):
+    """A name that is edited in place; a click chooses its row too, and with Shift or Ctrl does no more than that."""
+
+    def __init__(self, row: ListRow) -> None:
+        super().__init__(toolTip="Rename")
+        self.setObjectName("nameField")
+        self._row = row
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Choose the row, and edit."""
+        if event.modifiers() & _MORE:
+            self._row.choose(add=True)
+            return
+        self._row.choose(add=False)
+        super().mousePressEvent(event)
+
+
+class HandleRow(ListRow):
+    """Switch, swatch, name, reset and delete of one handle."""
+
+    def __init__(self, handle_id: int, panel: HandlesPanel) -> None:
+        super().__init__(panel)
+        self._id = handle_id
+        self._color = ""
+        self.swatch = QToolButton(toolTip="Colour", autoRaise=True)
+        self.swatch.setFixedSize(20, 20)
+        self.swatch.clicked.connect(self._on_swatch_clicked)
+        self.is_enabled = QCheckBox(toolTip="A switched-off handle neither moves nor holds anything")
+        self.is_enabled.clicked.connect(lambda on: panel.change_handle(self._id, "Switch handle", enabled=on))
+        self.reset = tool_button("reset", "Put it back to rest")
+        self.reset.clicked.connect(lambda: panel.change_handle(self._id, "Reset pose", pose=Pose()))
+        self.delete.clicked.connect(lambda: panel.delete_handle(self._id))
+        self.lay_out(self.is_enabled, self.swatch, after=(self.reset,))
+
+    def show_handle(self, handle: Handle) -> None:
+        """Show a handle's name, colour and state."""
+        self._color = handle.color
+        self.swatch.setStyleSheet(swatch_style(handle.color, "7px"))
+        if not self.name.hasFocus():
+            self.name.setText(handle.name)
+        self.is_enabled.setChecked(handle.enabled)
+        self.reset.setEnabled(not handle.pose.is_identity)
+
+    def choose(self, *, add: bool) -> None:
+        """Choose the handle, or one more."""
+        self._panel.choose_handle(self._id, add=add)
+
+    def rename(self, name: str) -> None:
+        """Name the handle."""
+        self._panel.change_handle(self._id, "Rename handle", name=name or f"Handle {self._id}")
+
+    def _on_swatch_clicked(self) -> None:
+        dialog = QColorDialog(QColor(self._color), self)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.colorSelected.connect(
+            lambda color: self._panel.change_handle(self._id, "Colour handle", color=color.name())
+        )
+        dialog.open()
+
+
+class PinRow(ListRow):
+    """Mark, name, number of splats and delete of one pin."""
+
+    def __init__(self, pin_id: int, panel: HandlesPanel) -> None:
+        super().__init__(panel)
+        self._id = pin_id
+        # As wide as a handle's switch and swatch: names stand under names.
+        self._mark = QToolButton(autoRaise=True, toolTip="Pin: stays where it is")
+        self._mark.setFixedSize(20, 20)
+        self._mark.setStyleSheet(swatch_style(PIN_COLOR, "0px"))
+        self._mark.clicked.connect(lambda: self.choose(add=False))
+        space = QWidget()
+        space.setFixedWidth(self._switch_width())
+        self.held = PlainLabel()
+        self.held.setProperty("tone", "quiet")
+        self.delete.clicked.connect(lambda: panel.delete_pin(self._id))
+        self.lay_out(space, self._mark, after=(self.held,))
+
+    def show_pin(self, pin: Pin, n_splats: int) -> None:
+        """Show a pin's name, and how many splats it holds."""
+        if not self.name.hasFocus():
+            self.name.setText(pin.name)
+        self.held.setText(f"{n_splats:,}")
+        self.held.setToolTip(f"Holds {n_splats:,} splats")
+
+    def choose(self, *, add: bool) -> None:
+        """Choose the pin, or one more."""
+        self._panel.choose_pin(self._id, add=add)
+
+    def rename(self, name: str) -> None:
+        """Name the pin."""
+        self._panel.change_pin(self._id, "Rename pin", name=name or f"Pin {self._id}")
+
+    def _switch_width(self) -> int:
+        return QCheckBox().sizeHint().width()
+
+
+def swatch_style(color: str, radius: str) -> str:
+    """Style of a small field of colour."""
+    return f"QToolButton {{ background: {color}; border-radius: {radius}; margin: 3px; padding: 0; }}"
+
+
+def tool_button(name: str, tip: str) -> QToolButton:
+    """Small button with an icon."""
+    return QToolButton(icon=icon(name), toolTip=tip, autoRaise=True, iconSize=QSize(16, 16))
