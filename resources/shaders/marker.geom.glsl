@@ -18,7 +18,7 @@ void main()
   vec4 center = MCDCMatrix * vec4(gl_in[0].gl_Position.xyz, 1.0);
   if (center.w <= 0.0) return;
   int code = int(colorVS[0].a * 255.0 / 28.0 + 0.5) - 1;
-  const float SIZES[3] = float[](1.0, 0.95, 2.0);
+  const float SIZES[3] = float[](1.0, 1.1, 2.0);
   float diameter = pointPx * SIZES[code / 3] * (code % 3 == 2 ? 1.3 : 1.0) + 2.0;
   for (int q = 0; q < 4; q++)
   {

@@ -197,7 +197,7 @@ def style_sheet() -> str:
     #sectionHeader, #sectionHeader:checked {{ background: {PANEL}; color: {TEXT}; }}
     #sectionHeader:hover, #sectionHeader:checked:hover {{ background: {RAISED}; }}
     #detailsHeader, #detailsHeader:checked {{ background: transparent; color: {QUIET}; padding: 2px; }}
-    #handleRow {{ border-radius: 4px; }}
+    #handleRow {{ border-radius: 4px; border-left: 2px solid transparent; }}
     #handleRow[chosen="yes"] {{ background: {RAISED}; }}
     #handleRow[chosen="last"] {{ background: {RAISED}; border-left: 2px solid {ACCENT}; }}
     #handleList, #handleList > QWidget > QWidget {{ background: transparent; }}
