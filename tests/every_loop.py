@@ -3,8 +3,12 @@
 import numpy as np
 
 from splap_editor.core.adaptation.kernel_adaptation import adapted_splats
+from splap_editor.core.adaptation.options import AdaptationOptions
+from splap_editor.core.arap.options import ArapOptions
+from splap_editor.core.bbw.levels import Level, coarser_level
+from splap_editor.core.bbw.options import BbwOptions
 from splap_editor.core.deformers import method_titles
-from splap_editor.core.graph.ellipse_offset import normal_offsets
+from splap_editor.core.graph.ellipse_offset import normal_offsets, touch_scales
 from splap_editor.core.graph.options import GraphOptions
 from splap_editor.core.handle_nodes import Region
 from splap_editor.core.options import OptionSet
@@ -12,9 +16,13 @@ from splap_editor.core.reach_options import ReachOptions
 from splap_editor.core.splats.contributions import contributions
 from splap_editor.core.splats.spherical_harmonics import view_colors
 from splap_editor.core.splats.splats import Splats
+from splap_editor.core.surface.geodesics import geodesic_distances
 from splap_editor.engine.bound_edit import bind, ready_for_drags
 from splap_editor.engine.edit import Edit, Handle, Pose
 from splap_editor.engine.surface import surface_of
+from splap_editor.io.ply_header import ply_header
+from splap_editor.io.ply_lists import list_table
+from tests.reference.ply import ply_bytes, splat_columns
 
 
 def call_every_loop() -> None:
@@ -34,8 +42,34 @@ def call_every_loop() -> None:
         bound.drag(edit)
     adapted_splats(splats, kernels)
     contributions(splats, surface.ellipses)
+    for method, options in CHOICES:
+        edit = Edit(handles, pins, method, OptionSet(ReachOptions(None), options))
+        bind(surface, edit).pose()
     normal_offsets(surface.ellipses, surface.graph.edges[:4])
+    touch_scales(surface.ellipses, surface.graph.edges[:4], 0.0)
+    geodesic_distances(surface.graph, np.array([0]))
+    # Weights of a few thousand nodes are found without.
+    n = len(surface.rest)
+    coarser_level(Level(surface.rest, surface.L, surface.M, np.arange(n), np.zeros(0, np.int64)), np.zeros(n, np.bool_))
+    _read_lists()
     _look(splats)
+
+
+CHOICES = (
+    ("arap", ArapOptions(kind="local-global", iterations=1)),
+    ("arap", AdaptationOptions("affine")),
+    ("arap", AdaptationOptions("none")),
+    ("bbw", BbwOptions("linear")),
+)
+"""Options that lead to loops which the defaults do not call."""
+
+
+def _read_lists() -> None:
+    """Read a file whose rows differ in size."""
+    columns = splat_columns(4, np.random.default_rng(0))
+    data = ply_bytes(columns, after={"face": {"vertex_indices": [np.arange(3, dtype="i4")]}})
+    header = ply_header(data, "faces.ply")
+    list_table("faces.ply", header, np.frombuffer(data[len(header.raw) :], np.uint8).copy())
 
 
 def _look(splats: Splats) -> None:

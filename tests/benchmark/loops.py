@@ -40,10 +40,10 @@ class Recorder:
 
     def groups(self) -> dict[str, int]:
         """Number of the group of each loop: those that call the same loop, or each other, have the same."""
-        reached = {name: reached(loop) for name, loop in self.loops.items()}
+        called = {name: reached(loop) for name, loop in self.loops.items()}
         numbers: dict[str, int] = {}
-        for number, name in enumerate(reached):
-            same = {numbers[other] for other in numbers if reached[name] & reached[other]}
+        for number, name in enumerate(called):
+            same = {numbers[other] for other in numbers if called[name] & called[other]}
             numbers = {other: number if n in same else n for other, n in numbers.items()} | {name: number}
         order = {number: i for i, number in enumerate(dict.fromkeys(numbers.values()))}
         return {name: order[number] for name, number in numbers.items()}

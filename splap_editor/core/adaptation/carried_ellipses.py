@@ -57,7 +57,7 @@ class KernelArrays(NamedTuple):
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract"})
-def write_kernels(carriers, weights, motions, moved, resting, rotations, rest, out):
+def write_kernels(carriers, weights, motions, square_shifts, moved, resting, rotations, rest, out):
     """Move the corners of each inscribed triangle with their carriers and write the Steiner circumellipses.
 
     In groups of nodes: their triangles are carried one by one, the ellipses are found side by side by vector
@@ -86,7 +86,7 @@ def write_kernels(carriers, weights, motions, moved, resting, rotations, rest, o
             any_moved &= not resting[i]
             changed[i] = any_moved
             if any_moved:
-                _carry_triangle(i, lane, carriers, weights, motions, rotations, ellipses, lanes)
+                _carry_triangle(i, lane, carriers, weights, motions, square_shifts, rotations, ellipses, lanes)
         _fit_ellipses(count, lanes)
         for lane in range(count):
             i = lo + lane
@@ -108,7 +108,7 @@ def write_kernels(carriers, weights, motions, moved, resting, rotations, rest, o
 
 
 @nb.njit(inline="always")
-def _carry_triangle(i, lane, carriers, weights, motions, rotations, ellipses, lanes):
+def _carry_triangle(i, lane, carriers, weights, motions, square_shifts, rotations, ellipses, lanes):
     """Fill a lane with both rest semi-axes, their images under the triangle's affine map, and its centre."""
     mx = my = mz = ax = ay = az = bx = by = bz = 0.0
     for c in range(3):
@@ -133,10 +133,10 @@ def _carry_triangle(i, lane, carriers, weights, motions, rotations, ellipses, la
     mx, my, mz = third * mx, third * my, third * mz
     # Beside a handle's rim the maps of its nodes and of those that stay differ so much that a corner may overshoot.
     x, y, z = mx - ellipses[i, 0], my - ellipses[i, 1], mz - ellipses[i, 2]
-    square, farthest = x * x + y * y + z * z, _squared_shift(motions, ellipses, i) * (1.0 + 1e-9)
-    if square > farthest:
+    square, farthest = x * x + y * y + z * z, square_shifts[i]
+    if square > farthest * (1.0 + 1e-9):
         for c in range(9):
-            farthest = max(farthest, _squared_shift(motions, ellipses, carriers[i, c]))
+            farthest = max(farthest, square_shifts[carriers[i, c]])
         if square > farthest:
             share = math.sqrt(farthest / square)
             mx, my, mz = ellipses[i, 0] + share * x, ellipses[i, 1] + share * y, ellipses[i, 2] + share * z
@@ -163,16 +163,6 @@ def _carry_triangle(i, lane, carriers, weights, motions, rotations, ellipses, la
             turned1 += rotations[i, a, b] * ellipses[i, 3 + b]
             turned2 += rotations[i, a, b] * ellipses[i, 6 + b]
         lanes[(_IMAGE_1 + a) * _LANES + lane], lanes[(_IMAGE_2 + a) * _LANES + lane] = grow1 * turned1, grow2 * turned2
-
-
-@nb.njit(inline="always")
-def _squared_shift(motions, ellipses, j):
-    """How far the motion of a node takes its own centre, squared."""
-    px, py, pz = ellipses[j, 0], ellipses[j, 1], ellipses[j, 2]
-    x = motions[j, 0] * px + motions[j, 3] * py + motions[j, 6] * pz + motions[j, 9] - px
-    y = motions[j, 1] * px + motions[j, 4] * py + motions[j, 7] * pz + motions[j, 10] - py
-    z = motions[j, 2] * px + motions[j, 5] * py + motions[j, 8] * pz + motions[j, 11] - pz
-    return x * x + y * y + z * z
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract"})

@@ -188,22 +188,23 @@ def adapt_kernels(
         find_moved(*nodes)
         _move_centers(rest, positions, moved, arrays)
     else:
-        motions = _spare_motions(binding)
+        motions, square_shifts = _spare_motions(binding), np.empty(len(positions))
         carriers, weights = binding.carriers, binding.weights
         if method == "paper":
             find_moved(*nodes)
             carriers, weights = binding.published_carriers
             motions[:, :9] = np.eye(3).ravel()
             motions[:, 9:] = np.where(moved[:, None], positions - rest.means[: len(positions)], 0.0)
+            square_shifts = np.square(motions[:, 9:]).sum(axis=1)
         elif method == "surface":
-            find_motions(binding.stencils, binding.inverse_moments, binding.dampings, *nodes, motions)
+            find_motions(binding.stencils, binding.inverse_moments, binding.dampings, *nodes, motions, square_shifts)
         else:
             assert binding.graph is not None, "asked for at the door"
-            find_ring_motions(hops, binding.graph.indptr, binding.graph.indices, *nodes, motions)
+            find_ring_motions(hops, binding.graph.indptr, binding.graph.indices, *nodes, motions, square_shifts)
             # Each splat carries itself.
             carriers = np.repeat(np.arange(len(positions), dtype=np.int32)[:, None], 9, axis=1)
             weights = np.tile(np.array([1.0, 0.0], np.float32), (len(positions), 3))
-        write_kernels(carriers, weights, motions, moved, resting, rotations, rest, arrays)
+        write_kernels(carriers, weights, motions, square_shifts, moved, resting, rotations, rest, arrays)
         binding.spare_motions.append(motions)
     adapt_inert(binding.inert_carriers, binding.inert_weights, rest, positions, rotations, moved, arrays)
     return AdaptedKernels(binding, arrays)

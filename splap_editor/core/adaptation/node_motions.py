@@ -21,13 +21,16 @@ def find_moved(rest, positions, rotations, resting, still, moved):
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract"})
-def find_motions(stencils, inverse_moments, dampings, rest, positions, rotations, resting, still, moved, motions):
-    """Affine map x ↦ A x + b of each node's neighbourhood, as the columns of A and then b.
+def find_motions(
+    stencils, inverse_moments, dampings, rest, positions, rotations, resting, still, moved, motions, square_shifts
+):
+    """Affine map x ↦ A x + b of each node's neighbourhood, as the columns of A and then b; how far each went, squared.
 
-    A node that `find_moved` would not mark has the identity.
+    A node that `find_moved` would not mark has the identity, and went nowhere.
     """
     for i in range(len(positions)):
         moved[i] = not resting[i] and _has_moved(i, rest, positions, rotations, still)
+        square_shifts[i] = _square_shift(i, rest, positions) if moved[i] else 0.0
         if not moved[i]:
             for k in range(12):
                 motions[i, k] = 1.0 if k == 0 or k == 4 or k == 8 else 0.0
@@ -75,7 +78,7 @@ def find_motions(stencils, inverse_moments, dampings, rest, positions, rotations
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract"})
-def find_ring_motions(hops, indptr, indices, rest, positions, rotations, resting, still, moved, motions):
+def find_ring_motions(hops, indptr, indices, rest, positions, rotations, resting, still, moved, motions, square_shifts):
     """Least-squares affine map of each node's ``hops``-ring, as in `find_motions`; moved if any of the ring is."""
     n = len(positions)
     seen = np.full(n, -1, np.int64)
@@ -105,6 +108,7 @@ def find_ring_motions(hops, indptr, indices, rest, positions, rotations, resting
                     moments[a, b] += edge * (rest[j, a] - rest[i, a])
                     cross[a, b] += edge * (positions[j, a] - positions[i, a])
         moved[i] &= not resting[i]
+        square_shifts[i] = _square_shift(i, rest, positions) if moved[i] else 0.0
         trace = moments[0, 0] + moments[1, 1] + moments[2, 2]
         # Directions that the ring does not span turn with the node; the share is too small to be felt in the others.
         damping = 1e-6 if trace > 1e-90 else 1.0
@@ -120,6 +124,13 @@ def find_ring_motions(hops, indptr, indices, rest, positions, rotations, resting
                 A = cross[a, 0] * inverse[0, b] + cross[a, 1] * inverse[1, b] + cross[a, 2] * inverse[2, b]
                 motions[i, 3 * b + a] = A
                 motions[i, 9 + a] -= A * rest[i, b]
+
+
+@nb.njit(inline="always")
+def _square_shift(i, rest, positions):
+    """How far a node went, squared."""
+    x, y, z = positions[i, 0] - rest[i, 0], positions[i, 1] - rest[i, 1], positions[i, 2] - rest[i, 2]
+    return x * x + y * y + z * z
 
 
 @nb.njit(inline="always")
