@@ -6,8 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from splap_editor.io import plain_edit as plain
 from splap_editor.io.png import write_png
-from splap_editor.io.recipe import Recipe, read_recipe
+from splap_editor.io.recipe import read_recipe
 from splap_editor.io.session_file import content_hash, read_session_file
 from splap_editor.io.session_specs import SessionFile
 from splap_editor.stage_report import StageReport
@@ -22,14 +23,14 @@ if TYPE_CHECKING:
 LARGEST_TURNTABLE = 10_000
 
 
-def read_edit_file(options: argparse.Namespace) -> Recipe | SessionFile | None:
+def read_edit_file(options: argparse.Namespace) -> plain.Edit | SessionFile | None:
     """Read what ``--recipe`` or ``--session`` names, None for neither."""
     if options.recipe is not None:
         return read_recipe(options.recipe)
     return read_session_file(options.session) if options.session is not None else None
 
 
-def edit_for(held: Recipe | SessionFile | None, file: "SplatFile", say: Callable[[str], None]) -> "Edit":
+def edit_for(held: plain.Edit | SessionFile | None, file: "SplatFile", say: Callable[[str], None]) -> "Edit":
     """Make an edit of a recipe or session for a file; says so where the session was made for another."""
     from splap_editor.engine.edit import Edit
     from splap_editor.engine.recipe_edit import edit_of
@@ -37,7 +38,7 @@ def edit_for(held: Recipe | SessionFile | None, file: "SplatFile", say: Callable
 
     if held is None:
         return Edit()
-    if isinstance(held, Recipe):
+    if isinstance(held, plain.Edit):
         return edit_of(held, file.splats)
     if held.ply.content_hash and content_hash(file.path) != held.ply.content_hash:
         say(f"note: {file.path.name} is not the file that the session was saved with, or has changed since")
@@ -107,7 +108,7 @@ def render(options: argparse.Namespace) -> int:
 
 
 def _prepared(
-    options: argparse.Namespace, held: Recipe | SessionFile | None, report: StageReport
+    options: argparse.Namespace, held: plain.Edit | SessionFile | None, report: StageReport
 ) -> tuple["SplatFile", "FramePoser"]:
     from splap_editor.engine.cache import StageCache
     from splap_editor.engine.frames import frame_poser
@@ -131,7 +132,7 @@ def _prepared(
 
 
 def _studio(
-    options: argparse.Namespace, held: Recipe | SessionFile | None, file: "SplatFile"
+    options: argparse.Namespace, held: plain.Edit | SessionFile | None, file: "SplatFile"
 ) -> tuple["Studio", "View"]:
     """The scene off screen as the session shows it, with the choices of the command line over that."""
     import numpy as np

@@ -12,15 +12,14 @@ from splap_editor.cli import main
 from splap_editor.core.options import OptionSet
 from splap_editor.core.pose import Pose
 from splap_editor.core.reach_options import ReachOptions
+from splap_editor.core.timeline import Key, Timeline
 from splap_editor.io.ply import read_ply
-from splap_editor.io.recipe import HandleSpec, Recipe, write_recipe
+from splap_editor.io.recipe import Edit, Handle, write_recipe
 from splap_editor.io.session_file import write_session_file
 from splap_editor.io.session_specs import (
     HandleSettings,
-    KeySpec,
     PlySpec,
     SessionFile,
-    TimelineSpec,
     ViewSpec,
 )
 from splap_editor.resources import resource
@@ -43,11 +42,9 @@ def session(tmp_path, ply):
     lifted = Pose((0.3, 0.0, 0.0))
     held = SessionFile(
         PlySpec("tube.ply", "", splats.n_splats),
-        Recipe(
-            options=OptionSet(ReachOptions(None)), handles=(HandleSpec("end", end, 0.15, translate=(0.3, 0.0, 0.0)),)
-        ),
+        Edit(options=OptionSet(ReachOptions(None)), handles=(Handle("end", end, 0.15, translate=(0.3, 0.0, 0.0)),)),
         (HandleSettings(4, "#ffffff"),),
-        timeline=TimelineSpec((KeySpec(1, {4: Pose()}), KeySpec(3, {4: lifted})), 3, 3),
+        timeline=Timeline((Key(1, {4: Pose()}), Key(3, {4: lifted})), 3, 3),
         view=ViewSpec((0.0, -6.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
         display={"mode": "ellipses", "background": "black"},
     )

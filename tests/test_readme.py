@@ -5,6 +5,7 @@ import shutil
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import splap_editor as splap
 from splap_editor.resources import resource
@@ -31,9 +32,31 @@ def test_an_edit_of_a_script_comes_back_from_its_recipe(tmp_path):
         handles=[splap.Handle(center=(0.0, 0.0, 1.0), radius=0.1, scale=2.0)],
         pins=[splap.Pin(rows=(3, 4))],
         method="bbw",
-        options=[splap.BbwOptions(blending="linear"), splap.GraphOptions(laplacian="robust")],
+        options=[splap.options.BbwOptions(blending="linear"), splap.options.GraphOptions(laplacian="robust")],
     )
-    splap.write_edit(tmp_path / "edit.json", edit)
-    assert splap.read_edit(tmp_path / "edit.json") == splap.Edit(
+    splap.write_recipe(tmp_path / "edit.json", edit)
+    assert splap.read_recipe(tmp_path / "edit.json") == splap.Edit(
         [splap.Handle("", (0.0, 0.0, 1.0), 0.1, scale=2.0)], edit.pins, "bbw", edit.options
     )
+    assert repr(edit).startswith("Edit(handles=(Handle(name='', center=(0.0, 0.0, 1.0)")
+    assert repr(edit.pins) == "(Pin(center=None, radius=None, rows=(3, 4)),)"
+
+
+def test_the_options_of_every_part_of_an_edit_go_by_their_names():
+    for name, group in splap.options.GROUPS.items():
+        assert getattr(splap.options, name) is group and group.__name__ == name
+    assert set(splap.options.__all__) >= set(splap.options.GROUPS)
+
+
+def test_a_set_of_handles_is_bound_once_and_posed_anew_at_will():
+    file = splap.read_ply(resource("samples", "tube.ply"))
+    means = np.asarray(file.splats.means, np.float64)
+    ends = [tuple(means[row].tolist()) for row in (means[:, 2].argmin(), means[:, 2].argmax())]
+    handle = splap.Handle(center=ends[1], radius=0.1)
+    bound = splap.bind(splap.prepare(file), splap.Edit([handle], [splap.Pin(center=ends[0], radius=0.1)]))
+    lifted = bound.pose([splap.Pose(translate=(0.0, 0.3, 0.0))]).splats
+    assert np.linalg.norm(np.asarray(lifted.means) - means, axis=1).max() > 0.2
+    with pytest.raises(ValueError, match="one Pose for each of the 1 enabled handles"):
+        bound.pose([splap.Pose(), splap.Pose()])
+    with pytest.raises(ValueError, match="one Pose for each of the 1 enabled handles"):
+        bound.pose([(0.0, 0.3, 0.0)])

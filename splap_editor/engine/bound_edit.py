@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar, cast
 
@@ -17,6 +17,7 @@ from splap_editor.core.deformers import DEFORMERS
 from splap_editor.core.handle_nodes import handle_nodes
 from splap_editor.core.kept_arrays import Arrays
 from splap_editor.core.options import loaded, world_length
+from splap_editor.core.pose import Pose
 from splap_editor.core.progress import Progress, Runner, StageProgress, in_turn, no_progress, silent
 from splap_editor.core.reach_options import ReachOptions
 from splap_editor.core.splats.splats import Splats
@@ -26,8 +27,8 @@ from splap_editor.engine.quantities import Snapshot
 from splap_editor.engine.recipe_edit import edit_of
 from splap_editor.engine.sources import source_hash
 from splap_editor.engine.surface import Surface, surface_of
+from splap_editor.io import plain_edit as plain
 from splap_editor.io.ply import SplatFile
-from splap_editor.io.recipe import Recipe
 
 if TYPE_CHECKING:
     from splap_editor.core.bbw.bbw import WeightedDeformer
@@ -109,27 +110,34 @@ class BoundEdit:
 
     def pose(
         self,
-        edit: Edit | None = None,
+        edit: Edit | Sequence[Pose] | None = None,
         *,
         progress: Progress = no_progress,
         shown: Callable[[Posed], None] | None = None,
     ) -> Posed:
-        """Settle the handles at the poses of an edit that binds like this one's, by default its own.
+        """Settle the handles at other poses, by default at those of the edit that was bound.
 
         Parameters
         ----------
-        edit : Edit, optional
+        edit : Edit or sequence of Pose, optional
+            One that binds like the one bound, or a pose for each enabled handle.
         progress : callable
             Told how far the deformer is.
         shown : callable, optional
             Given intermediate results.
+
+        Raises
+        ------
+        ValueError
+            Not every enabled handle has its pose.
         """
-        edit = edit or self.edit
+        edit = self._at(edit)
         show = None if shown is None else lambda deformation: shown(self.adapted(edit, deformation))
         return self.adapted(edit, self.deformer.solve(edit.transforms, progress=progress, shown=show))
 
-    def drag(self, edit: Edit) -> Posed:
-        """Pose quickly for the frame of a drag, going on from the frame before."""
+    def drag(self, edit: Edit | Sequence[Pose]) -> Posed:
+        """Pose quickly for the frame of a drag, going on from the frame before; else as `pose`."""
+        edit = self._at(edit)
         return self.adapted(edit, self.deformer.drag(edit.transforms))
 
     def adapted(self, edit: Edit, deformation: Deformation) -> Posed:
@@ -137,10 +145,19 @@ class BoundEdit:
         kernels = kernels_of(self.surface, edit, deformation)
         return Posed(self.surface.binding.splats, self.surface, self, deformation, kernels)
 
+    def _at(self, poses: Edit | Sequence[Pose] | None) -> Edit:
+        """Edit at other poses."""
+        if poses is None or isinstance(poses, Edit):
+            return poses or self.edit
+        held = self.edit.active_handles
+        if len(poses) != len(held) or not all(isinstance(pose, Pose) for pose in poses):
+            raise ValueError(f"poses must be one Pose for each of the {len(held)} enabled handles, got {poses!r}")
+        return self.edit.with_poses({handle.handle_id: pose for handle, pose in zip(held, poses, strict=True)})
+
 
 def bind(
     surface: Surface,
-    edit: Edit | Recipe,
+    edit: Edit | plain.Edit,
     *,
     cache: StageCache | None = None,
     progress: Progress = no_progress,
@@ -152,7 +169,7 @@ def bind(
     Parameters
     ----------
     surface : Surface
-    edit : Edit or Recipe
+    edit : Edit, of a scene or plain
         With an enabled handle at least.
     cache : StageCache, optional
         Keeps what took long.
@@ -170,7 +187,7 @@ def bind(
     ValueError
         The surface was made with other graph options than the edit's.
     """
-    edit = edit_of(edit, surface.binding.splats) if isinstance(edit, Recipe) else edit
+    edit = edit_of(edit, surface.binding.splats) if isinstance(edit, plain.Edit) else edit
     if surface.options != edit.graph:
         raise ValueError(
             f"the surface was made with {surface.options}, the edit wants {edit.graph}: prepare it with these"
@@ -183,7 +200,7 @@ def bind(
 
 def posed(
     file: SplatFile,
-    edit: Edit | Recipe,
+    edit: Edit | plain.Edit,
     *,
     cache: StageCache | None = None,
     stages: StageProgress = silent,
@@ -195,7 +212,7 @@ def posed(
     Parameters
     ----------
     file : SplatFile
-    edit : Edit or Recipe
+    edit : Edit, of a scene or plain
         Without an enabled handle everything stays at rest, and no surface is made unless it is wanted.
     cache, run
         As of `bind`.
@@ -204,7 +221,7 @@ def posed(
     with_surface : bool
         Make the surface in any case.
     """
-    edit = edit_of(edit, file.splats) if isinstance(edit, Recipe) else edit
+    edit = edit_of(edit, file.splats) if isinstance(edit, plain.Edit) else edit
     if not edit.active_handles and not with_surface:
         return Posed(file.splats)
     surface = surface_of(file.splats, edit.graph, cache=cache, stages=stages)

@@ -13,7 +13,7 @@ from splap_editor.core.handle_nodes import Region
 from splap_editor.core.options import Length, OptionSet
 from splap_editor.core.pose import Pose
 from splap_editor.core.reach_options import CageOptions
-from splap_editor.engine.timeline import Timeline
+from splap_editor.core.timeline import Timeline
 
 HANDLE_COLORS = ("#f2a93b", "#4fb3ff", "#7bd66b", "#e66fb0", "#b18cff", "#ff7a59", "#30bfae", "#d9d24a")
 """Handle colours in the order they are given out; told apart by the colour-blind too when neighbours in the list."""

@@ -6,12 +6,12 @@ from pathlib import Path
 
 from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels, adapted_splats
 from splap_editor.core.progress import Progress, Runner, in_turn, no_progress, part_of
+from splap_editor.core.timeline import LAST_FRAME
 from splap_editor.engine.bound_edit import BoundEdit, bind
 from splap_editor.engine.cache import StageCache
 from splap_editor.engine.edit import Edit
 from splap_editor.engine.keyframes import edit_at_frame
 from splap_editor.engine.surface import Surface
-from splap_editor.engine.timeline import LAST_FRAME
 from splap_editor.io.ply import SplatFile, write_ply
 
 

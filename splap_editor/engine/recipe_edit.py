@@ -1,20 +1,21 @@
-"""Recipes on disk and edits in memory, each made from the other."""
+"""Edits as plain values, as a recipe holds them, and edits of a scene, each made from the other."""
 
 import numpy as np
 
 from splap_editor.core.handle_nodes import Region
 from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.edit import HANDLE_COLORS, Edit, Handle, Pin
-from splap_editor.io.recipe import HandleSpec, PinSpec, Recipe, RecipeError
-from splap_editor.io.recipe_specs import Vector
+from splap_editor.io import plain_edit as plain
+from splap_editor.io.plain_edit import Vector
+from splap_editor.io.recipe import RecipeError
 
 
-def recipe_of(edit: Edit, *, with_disabled: bool = False) -> Recipe:
+def recipe_of(edit: Edit, *, with_disabled: bool = False) -> plain.Edit:
     """Write an edit as a recipe; disabled handles are left out unless wanted, since they do nothing."""
-    return Recipe(
+    return plain.Edit(
         handles=tuple(_handle_spec(handle) for handle in (edit.handles if with_disabled else edit.active_handles)),
         pins=tuple(
-            PinSpec(*_place(pin.region), name="" if pin.name == _pin_name(number) else pin.name)
+            plain.Pin(*_place(pin.region), name="" if pin.name == _pin_name(number) else pin.name)
             for number, pin in enumerate(edit.pins, start=1)
         ),
         method=edit.method,
@@ -22,7 +23,7 @@ def recipe_of(edit: Edit, *, with_disabled: bool = False) -> Recipe:
     )
 
 
-def edit_of(recipe: Recipe, splats: Splats) -> Edit:
+def edit_of(recipe: plain.Edit, splats: Splats) -> Edit:
     """Make an edit of a recipe.
 
     The centre of a handle given by rows alone is the mean of its splats.
@@ -59,9 +60,9 @@ def _pin_name(number: int) -> str:
     return f"Pin {number}"
 
 
-def _handle_spec(handle: Handle) -> HandleSpec:
+def _handle_spec(handle: Handle) -> plain.Handle:
     center, radius, rows = _place(handle.region)
-    return HandleSpec(
+    return plain.Handle(
         handle.name,
         center,
         radius,
@@ -80,7 +81,7 @@ def _place(region: Region) -> tuple[Vector, float | None, tuple[int, ...] | None
     return center, None, tuple(np.asarray(region.rows).tolist())
 
 
-def _region(spec: HandleSpec | PinSpec, splats: Splats, name: str) -> Region:
+def _region(spec: plain.Handle | plain.Pin, splats: Splats, name: str) -> Region:
     if spec.rows is None:
         if spec.center is None or spec.radius is None:
             raise RecipeError(f"{name} needs a center and a radius, or the rows of its splats")

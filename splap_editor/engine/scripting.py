@@ -12,8 +12,8 @@ from splap_editor.engine.edit import Edit
 from splap_editor.engine.export_report import ExportReport, export_report
 from splap_editor.engine.quantities import columns_of
 from splap_editor.engine.surface import Surface, surface_of
+from splap_editor.io import plain_edit as plain
 from splap_editor.io.ply import SplatFile, read_ply, write_ply
-from splap_editor.io.recipe import Recipe
 
 
 def prepare(
@@ -39,7 +39,7 @@ def prepare(
 
 def deform(
     source: str | os.PathLike[str],
-    edit: Edit | Recipe,
+    edit: Edit | plain.Edit,
     output: str | os.PathLike[str],
     *,
     layout: str | None = None,
@@ -54,8 +54,8 @@ def deform(
     Parameters
     ----------
     source, output : path
-    edit : Edit or Recipe
-        ``splap.Edit`` is a `Recipe`.
+    edit : Edit, of a scene or plain
+        ``splap.Edit`` is the plain one, by place or file row.
     layout : str, optional
         Read the file as this layout instead of the recognised one.
     columns : sequence of str

@@ -16,13 +16,13 @@ from splap_editor.core.presets import PRESETS, with_preset
 from splap_editor.core.reach_options import CageOptions, ReachOptions
 from splap_editor.io.atomic_file import atomic_file
 from splap_editor.io.json_object import JsonObject, json_lines, parsed_json, shown
-from splap_editor.io.recipe_specs import HandleSpec, PinSpec, Recipe, Vector
+from splap_editor.io.plain_edit import Edit, Handle, Pin, Vector
 from splap_editor.io.regular_file import regular_bytes
 
 __all__ = [
-    "HandleSpec",
-    "PinSpec",
-    "Recipe",
+    "Edit",
+    "Handle",
+    "Pin",
     "RecipeError",
     "pose_from_json",
     "pose_to_json",
@@ -59,7 +59,7 @@ class RecipeError(ValueError):
     """A recipe that cannot be read; the message names the key and says what to put there."""
 
 
-def read_recipe(path: str | os.PathLike[str]) -> Recipe:
+def read_recipe(path: str | os.PathLike[str]) -> Edit:
     """Read a recipe.
 
     Raises
@@ -79,7 +79,7 @@ def read_recipe(path: str | os.PathLike[str]) -> Recipe:
         raise RecipeError(f"{path.name}: {error}.") from None
 
 
-def write_recipe(path: str | os.PathLike[str], recipe: Recipe) -> None:
+def write_recipe(path: str | os.PathLike[str], recipe: Edit) -> None:
     """Write a recipe, whole or not at all.
 
     Raises
@@ -100,7 +100,7 @@ def write_recipe(path: str | os.PathLike[str], recipe: Recipe) -> None:
         raise RecipeError(f"{path} cannot be written: {error.strerror or error}. Choose another place.") from error
 
 
-def recipe_from_json(value: Any) -> Recipe:
+def recipe_from_json(value: Any) -> Edit:
     """Make a recipe of what ``json`` parsed.
 
     A missing key takes its default, or what the preset says, which is not kept by its name; rotations are normalised.
@@ -126,10 +126,10 @@ def recipe_from_json(value: Any) -> Recipe:
         (recipe.object(key, tuple(options_of(group))) if key else recipe).options(group, usual[group])
         for key, group in recipe_groups()
     ]
-    return Recipe(
+    return Edit(
         handles=tuple(_handle(h, i) for i, h in enumerate(recipe.objects("handles", HANDLE_KEYS))),
-        pins=tuple(PinSpec(*_region(pin), pin.text("name", "")) for pin in recipe.objects("pins", PIN_KEYS)),
-        method=recipe.choice("method", tuple(method_titles()), Recipe.method),
+        pins=tuple(Pin(*_region(pin), pin.text("name", "")) for pin in recipe.objects("pins", PIN_KEYS)),
+        method=recipe.choice("method", tuple(method_titles()), Edit.method),
         options=OptionSet(*groups),
     )
 
@@ -144,10 +144,10 @@ def _region(region: JsonObject) -> tuple[Vector | None, float | None, tuple[int,
     return center, None, region.rows("rows")
 
 
-def _handle(handle: JsonObject, index: int) -> HandleSpec:
+def _handle(handle: JsonObject, index: int) -> Handle:
     center, radius, rows = _region(handle)
     pose = pose_from_json(handle)
-    return HandleSpec(
+    return Handle(
         name=handle.text("name", f"handle {index + 1}"),
         center=center,
         radius=radius,
@@ -161,7 +161,7 @@ def _handle(handle: JsonObject, index: int) -> HandleSpec:
 
 def pose_from_json(pose: JsonObject) -> Pose:
     """Pose of an object with the keys translate, rotate and scale, each at rest where it is missing."""
-    rotate = pose.vector("rotate", 4, HandleSpec.rotate)
+    rotate = pose.vector("rotate", 4, Handle.rotate)
     length = math.hypot(*rotate)
     if not 0 < length < math.inf:
         raise pose.refuse("rotate", "a quaternion w, x, y, z that is not zero")
@@ -170,7 +170,7 @@ def pose_from_json(pose: JsonObject) -> Pose:
         w, x, y, z = (part / length for part in rotate)
         length = math.hypot(w, x, y, z)
         rotate = (w / length, x / length, y / length, z / length)
-    return Pose(pose.vector("translate", 3, HandleSpec.translate, most=LARGEST_COORDINATE), rotate, _scale(pose))
+    return Pose(pose.vector("translate", 3, Handle.translate, most=LARGEST_COORDINATE), rotate, _scale(pose))
 
 
 def pose_to_json(pose: Pose) -> dict[str, Any]:
@@ -194,7 +194,7 @@ def _scale(handle: JsonObject) -> float | Vector:
     return scale
 
 
-def recipe_to_json(recipe: Recipe) -> dict[str, Any]:
+def recipe_to_json(recipe: Edit) -> dict[str, Any]:
     """Plain objects of a recipe for ``json``; what is left at its default is left out."""
     value: dict[str, Any] = {"version": VERSION, "method": recipe.method}
     said = {(key, group): _said(recipe.options[group]) for key, group in recipe_groups()}
@@ -202,8 +202,8 @@ def recipe_to_json(recipe: Recipe) -> dict[str, Any]:
     for key, group in (("graph", GraphOptions), ("", ReachOptions)):
         _put(value, key, said.pop((key, group)))
     # The region of a handle has no default, so it never goes missing.
-    value["handles"] = [{"name": h.name, **_without_defaults(h, HandleSpec(name=h.name))} for h in recipe.handles]
-    value["pins"] = [_without_defaults(pin, PinSpec()) for pin in recipe.pins]
+    value["handles"] = [{"name": h.name, **_without_defaults(h, Handle(name=h.name))} for h in recipe.handles]
+    value["pins"] = [_without_defaults(pin, Pin()) for pin in recipe.pins]
     for (key, _), options in said.items():
         _put(value, key, options)
     return value

@@ -12,18 +12,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.timeline import LAST_FRAME, Key, Timeline
 from splap_editor.io.atomic_file import atomic_file
 from splap_editor.io.json_object import JsonObject, json_lines, parsed_json, shown
 from splap_editor.io.recipe import RecipeError, pose_from_json, pose_to_json, recipe_from_json, recipe_to_json
 from splap_editor.io.regular_file import open_regular, regular_bytes
 from splap_editor.io.session_specs import (
     HandleSettings,
-    KeySpec,
     PinSettings,
     PlySpec,
     Scalar,
     SessionFile,
-    TimelineSpec,
     ViewSpec,
 )
 
@@ -48,7 +47,6 @@ _KEYS = (
     "selection_sets",
     "document",
 )
-_LAST_FRAME = 1_000_000
 _HASH_CHUNK = 1 << 20
 
 
@@ -227,8 +225,8 @@ def _chosen(session: JsonObject, key: str, known: list[int]) -> tuple[int, ...]:
     return tuple(i for i in session.rows(key) if i in known) if key in session else ()
 
 
-def _timeline(timeline: JsonObject) -> TimelineSpec:
-    keys: list[KeySpec] = []
+def _timeline(timeline: JsonObject) -> Timeline:
+    keys: list[Key] = []
     for key in timeline.objects("keys", ("frame", "poses")):
         poses = {}
         for pose in key.objects("poses", ("id", "translate", "rotate", "scale")):
@@ -236,25 +234,25 @@ def _timeline(timeline: JsonObject) -> TimelineSpec:
             if handle_id in poses:
                 raise pose.refuse("id", "a handle that no other pose of the key has")
             poses[handle_id] = pose_from_json(pose)
-        frame = key.integer("frame", 0, low=1, high=_LAST_FRAME)
+        frame = key.integer("frame", 0, low=1, high=LAST_FRAME)
         if keys and frame <= keys[-1].frame:
             raise key.refuse("frame", "after that of the key before")
-        keys.append(KeySpec(frame, poses))
-    usual = TimelineSpec()
+        keys.append(Key(frame, poses))
+    usual = Timeline()
     fps = timeline.number("fps", usual.fps, above=0.0)
     if fps > 1000.0:
         raise timeline.refuse("fps", "at most 1000")
-    return TimelineSpec(
+    return Timeline(
         tuple(keys),
-        timeline.integer("frame", usual.frame, low=1, high=_LAST_FRAME),
-        timeline.integer("n_frames", usual.n_frames, low=1, high=_LAST_FRAME),
+        timeline.integer("frame", usual.frame, low=1, high=LAST_FRAME),
+        timeline.integer("n_frames", usual.n_frames, low=1, high=LAST_FRAME),
         fps,
         timeline.choice("interpolation", ("smooth", "linear"), "smooth") == "smooth",
         timeline.flag("auto_key", usual.is_auto),
     )
 
 
-def _timeline_json(timeline: TimelineSpec) -> dict[str, Any]:
+def _timeline_json(timeline: Timeline) -> dict[str, Any]:
     return {
         "frame": timeline.frame,
         "n_frames": timeline.n_frames,

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.pose import Pose
-from splap_editor.io.recipe_specs import Recipe, Vector
+from splap_editor.core.timeline import Timeline
+from splap_editor.io.plain_edit import Edit, Vector
 
 Scalar = str | bool | int | float
 
@@ -51,26 +51,6 @@ class PinSettings:
 
 
 @dataclass(frozen=True)
-class KeySpec:
-    """Poses of handles, by id, at a frame."""
-
-    frame: int
-    poses: Mapping[int, Pose]
-
-
-@dataclass(frozen=True)
-class TimelineSpec:
-    """Keyframes: the fields of `splap_editor.engine.timeline.Timeline`."""
-
-    keys: tuple[KeySpec, ...] = ()
-    frame: int = 1
-    n_frames: int = 72
-    fps: float = 24.0
-    is_smooth: bool = True
-    is_auto: bool = True
-
-
-@dataclass(frozen=True)
 class ViewSpec:
     """Where the camera stands: the fields of `splap_editor.viewport.camera.View`, and its turntable's axis."""
 
@@ -90,7 +70,7 @@ class SessionFile:
     Parameters
     ----------
     ply : PlySpec
-    recipe : Recipe
+    recipe : Edit
         With the disabled handles too.
     handles : tuple of HandleSettings
         In the order of the recipe's handles.
@@ -98,7 +78,7 @@ class SessionFile:
         In the order of the recipe's pins; empty in files from before pins had ids.
     active_handles, active_pins : tuple of int
         Ids of the chosen handles and pins.
-    timeline : TimelineSpec
+    timeline : Timeline
     view : ViewSpec, optional
     display : mapping
         Display options by name. Which there are is up to the window: unknown ones are carried along.
@@ -110,12 +90,12 @@ class SessionFile:
     """
 
     ply: PlySpec
-    recipe: Recipe = field(default_factory=Recipe)
+    recipe: Edit = field(default_factory=Edit)
     handles: tuple[HandleSettings, ...] = ()
     pins: tuple[PinSettings, ...] = ()
     active_handles: tuple[int, ...] = ()
     active_pins: tuple[int, ...] = ()
-    timeline: TimelineSpec = field(default_factory=TimelineSpec)
+    timeline: Timeline = field(default_factory=Timeline)
     view: ViewSpec | None = None
     display: Mapping[str, Scalar] = field(default_factory=dict)
     selection: NDArray[np.bool_] | None = None

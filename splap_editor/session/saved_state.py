@@ -10,16 +10,13 @@ from splap_editor.core.index_spaces import FileMask
 from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.edit import Edit
 from splap_editor.engine.recipe_edit import edit_of, recipe_of
-from splap_editor.engine.timeline import Key, Timeline
 from splap_editor.io.session_file import SessionFileError, relative_path
 from splap_editor.io.session_specs import (
     HandleSettings,
-    KeySpec,
     PinSettings,
     PlySpec,
     Scalar,
     SessionFile,
-    TimelineSpec,
     ViewSpec,
 )
 from splap_editor.session.scene import Scene
@@ -89,7 +86,7 @@ def session_file_of(state: SavedState, folder: Path | None, content_hash: str) -
         tuple(PinSettings(pin.pin_id, pin.reach) for pin in edit.pins),
         state.active_handles,
         state.active_pins,
-        _timeline_spec(edit.timeline),
+        edit.timeline,
         state.look.view,
         state.look.display,
         state.selection if state.selection.any() else None,
@@ -123,7 +120,7 @@ def session_edit(session: SessionFile, splats: Splats) -> Edit:
             replace(pin, pin_id=settings.pin_id, reach=settings.reach)
             for pin, settings in zip(pins, session.pins, strict=True)
         )
-    return replace(edit, handles=handles, pins=pins, timeline=_timeline(session.timeline))
+    return replace(edit, handles=handles, pins=pins, timeline=session.timeline)
 
 
 def restore_scene(scene: Scene, session: SessionFile) -> None:
@@ -147,13 +144,3 @@ def restore_scene(scene: Scene, session: SessionFile) -> None:
             if getattr(session, name) is not None:
                 setattr(scene, name, getattr(session, name))
         scene.selection_sets = dict(session.selection_sets)
-
-
-def _timeline_spec(timeline: Timeline) -> TimelineSpec:
-    keys = tuple(KeySpec(key.frame, dict(key.poses)) for key in timeline.keys)
-    return TimelineSpec(keys, timeline.frame, timeline.n_frames, timeline.fps, timeline.is_smooth, timeline.is_auto)
-
-
-def _timeline(spec: TimelineSpec) -> Timeline:
-    keys = tuple(Key(key.frame, dict(key.poses)) for key in spec.keys)
-    return Timeline(keys, spec.frame, spec.n_frames, spec.fps, spec.is_smooth, spec.is_auto)

@@ -24,9 +24,9 @@ from splap_editor.engine.recipe_edit import edit_of, recipe_of
 from splap_editor.engine.scripting import write_posed
 from splap_editor.engine.surface import surface_of
 from splap_editor.engine.surface_stages import packed_stages
+from splap_editor.io import plain_edit as plain
 from splap_editor.io.ply import read_ply
 from splap_editor.io.recipe import RecipeError, recipe_from_json, recipe_to_json
-from splap_editor.io.recipe_specs import HandleSpec, Recipe
 from splap_editor.resources import resource
 
 FREED = OptionSet(ReachOptions(None))
@@ -293,10 +293,10 @@ def test_a_handful_of_splats_can_be_moved(splats, n):
     np.testing.assert_allclose(kernels.means, np.asarray(few.means, float) + np.array([1.0, 0.0, 0.0]), atol=1e-6)
 
 
-@pytest.mark.parametrize("handle", [HandleSpec("head", center=(0.0, 0.0, 0.0)), HandleSpec("head", radius=1.0)])
+@pytest.mark.parametrize("handle", [plain.Handle("head", center=(0.0, 0.0, 0.0)), plain.Handle("head", radius=1.0)])
 def test_a_handle_of_no_splats_is_refused(splats, handle):
     with pytest.raises(RecipeError, match=r"handle 'head' needs a center and a radius, or the rows of its splats"):
-        edit_of(Recipe(handles=(handle,)), splats)
+        edit_of(plain.Edit(handles=(handle,)), splats)
 
 
 def test_columns_without_a_surface_are_refused(tmp_path):

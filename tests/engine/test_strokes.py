@@ -11,7 +11,7 @@ from splap_editor.core.splats.occupancy import occupancy_ellipses
 from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.strokes import stroke_mends
 from splap_editor.engine.surface import surface_of
-from splap_editor.io.recipe import Recipe, RecipeError, read_recipe, recipe_from_json, recipe_to_json, write_recipe
+from splap_editor.io.recipe import Edit, RecipeError, read_recipe, recipe_from_json, recipe_to_json, write_recipe
 
 
 def leaves(gap: float) -> Splats:
@@ -81,10 +81,10 @@ def test_parts_at_the_same_splat_are_refused() -> None:
 
 def test_a_recipe_keeps_strokes(tmp_path) -> None:
     options = GraphOptions(separate=(Separation(A, B), Separation(B, A, -1)), join=(Joint(A, B, 0.25),))
-    write_recipe(tmp_path / "edit.json", Recipe(options=(options,)))
+    write_recipe(tmp_path / "edit.json", Edit(options=(options,)))
     assert read_recipe(tmp_path / "edit.json").options[GraphOptions] == options
-    assert "graph" not in recipe_to_json(Recipe())
-    said = recipe_to_json(Recipe(options=(options,)))["graph"]
+    assert "graph" not in recipe_to_json(Edit())
+    said = recipe_to_json(Edit(options=(options,)))["graph"]
     assert said["separate"][0] == {"a": [[0.4, 0.4, 0.0]], "b": [[1.9, 1.0, 0.0]]}
     assert said["join"] == [{"a": [[0.4, 0.4, 0.0]], "b": [[1.9, 1.0, 0.0]], "reach": 0.25}]
 

@@ -14,9 +14,9 @@ from splap_editor.core.options import OptionSet, ShareOfSize
 from splap_editor.core.pose import Pose
 from splap_editor.core.reach_options import CageOptions, ReachOptions
 from splap_editor.io.recipe import (
-    HandleSpec,
-    PinSpec,
-    Recipe,
+    Edit,
+    Handle,
+    Pin,
     RecipeError,
     read_recipe,
     recipe_from_json,
@@ -50,9 +50,9 @@ def random_recipe(seed):
         return tuple(part / math.hypot(*quat) for part in quat)
 
     pairs = tuple((int(a), int(a + 1)) for a in rng.integers(0, 99, 3))
-    return Recipe(
+    return Edit(
         handles=tuple(
-            HandleSpec(
+            Handle(
                 name=["hand", "Fuß", 'a "b"\n', ""][rng.integers(4)],
                 **region(True),
                 **maybe(translate=vector(), rotate=unit(), cage_radius=radius(CageOptions.cage_radius)),
@@ -60,7 +60,7 @@ def random_recipe(seed):
             )
             for _ in range(rng.integers(4))
         ),
-        pins=tuple(PinSpec(**region(False)) for _ in range(rng.integers(4))),
+        pins=tuple(Pin(**region(False)) for _ in range(rng.integers(4))),
         options=OptionSet(
             GraphOptions(**maybe(rule="paper", epsilon=0.1 / 3, k=20, cut=pairs, add=pairs, laplacian="robust")),
             ArapOptions(**maybe(kind="local-global", tolerance=1e-5 / 3, iterations=3, smoothness=0.0)),
@@ -85,7 +85,7 @@ def test_a_recipe_comes_back_exactly(seed, tmp_path):
 
 def test_what_is_left_out_takes_its_default():
     recipe = recipe_from_json({"version": 1, "handles": [BALL]})
-    assert recipe == Recipe(handles=(HandleSpec("handle 1", (0, 0, 0), 1),))
+    assert recipe == Edit(handles=(Handle("handle 1", (0, 0, 0), 1),))
     assert recipe.options[GraphOptions] == GraphOptions("touch", 0.005, 30)
     assert recipe.options[ArapOptions] == ArapOptions("converged", 1e-4, 10, 0.001)
     assert recipe.options[ReachOptions].free_radius == ShareOfSize(0.5)
@@ -99,7 +99,7 @@ def test_null_frees_everything():
 
 
 def test_a_pin_may_have_a_name():
-    recipe = Recipe(pins=(PinSpec((0.0, 0.0, 1.0), 0.5, name="foot"), PinSpec(rows=(1, 2))))
+    recipe = Edit(pins=(Pin((0.0, 0.0, 1.0), 0.5, name="foot"), Pin(rows=(1, 2))))
     held = recipe_to_json(recipe)
     assert [pin.get("name") for pin in held["pins"]] == ["foot", None]
     assert recipe_from_json(held) == recipe
@@ -118,9 +118,9 @@ def test_the_documented_recipe_is_read():
      "solver": {"kind": "libigl", "iterations": 10, "smoothness": 0.001}, "adaptation": "affine", "hops": 2}
     """
     recipe = recipe_from_json(json.loads(text))
-    handle = HandleSpec("hand", (1, 2, 3), 0.5, translate=(0, 0, 1), scale=1.5, cage_radius=0.7)
+    handle = Handle("hand", (1, 2, 3), 0.5, translate=(0, 0, 1), scale=1.5, cage_radius=0.7)
     assert recipe.handles == (handle,)
-    assert recipe.pins == (PinSpec(rows=(5, 6)),)
+    assert recipe.pins == (Pin(rows=(5, 6)),)
     options = recipe.options
     assert options[GraphOptions].cut == ((1, 2),)
     assert options[AdaptationOptions] == AdaptationOptions("affine", 2)
@@ -228,18 +228,18 @@ def test_paths_that_cannot_be_read_or_written_are_refused(tmp_path):
     with pytest.raises(RecipeError, match="cannot be read: it is a directory"):
         read_recipe(tmp_path)
     with pytest.raises(RecipeError, match="cannot be written"):
-        write_recipe(tmp_path / "no" / "edit.json", Recipe())
+        write_recipe(tmp_path / "no" / "edit.json", Edit())
 
 
 def test_a_recipe_that_could_not_be_read_again_is_not_written(tmp_path):
     with pytest.raises(RecipeError, match=r"handles\[0\].radius"):
-        write_recipe(tmp_path / "edit.json", Recipe(handles=(HandleSpec("a", (0, 0, 0), -1.0),)))
+        write_recipe(tmp_path / "edit.json", Edit(handles=(Handle("a", (0, 0, 0), -1.0),)))
     assert not (tmp_path / "edit.json").exists()
 
 
 def test_numpy_numbers_are_written_as_numbers(tmp_path):
     center = tuple(np.array([0.5, 1.5, 2.5], "f4"))
-    recipe = Recipe(handles=(HandleSpec("a", center, np.float64(2)), HandleSpec("b", rows=tuple(np.arange(3)))))
+    recipe = Edit(handles=(Handle("a", center, np.float64(2)), Handle("b", rows=tuple(np.arange(3)))))
     write_recipe(tmp_path / "a.json", recipe)
     back = read_recipe(tmp_path / "a.json")
     assert back.handles[0].center == (0.5, 1.5, 2.5)
@@ -255,7 +255,7 @@ def test_rotations_are_normalised(length):
 
 def test_a_pose_turns_and_scales_about_the_center():
     half = math.sqrt(0.5)
-    pose = HandleSpec("a", (1.0, 2.0, 3.0), 1.0, translate=(10.0, 0, 0), rotate=(half, 0, 0, half), scale=2.0).pose
+    pose = Handle("a", (1.0, 2.0, 3.0), 1.0, translate=(10.0, 0, 0), rotate=(half, 0, 0, half), scale=2.0).pose
     T = pose.matrix(np.array([1.0, 2.0, 3.0]))
     np.testing.assert_allclose(T @ [1, 2, 3, 1], [11, 2, 3, 1], atol=1e-12)
     # A quarter turn about z takes x to y.

@@ -10,7 +10,8 @@ from splap_editor.core.adaptation.options import AdaptationOptions
 from splap_editor.core.graph.options import GraphOptions
 from splap_editor.core.options import OptionSet
 from splap_editor.core.pose import Pose
-from splap_editor.io.recipe import HandleSpec, PinSpec, Recipe
+from splap_editor.core.timeline import Key, Timeline
+from splap_editor.io.recipe import Edit, Handle, Pin
 from splap_editor.io.session_file import (
     SessionFileError,
     content_hash,
@@ -22,11 +23,9 @@ from splap_editor.io.session_file import (
 )
 from splap_editor.io.session_specs import (
     HandleSettings,
-    KeySpec,
     PinSettings,
     PlySpec,
     SessionFile,
-    TimelineSpec,
     ViewSpec,
 )
 
@@ -39,20 +38,20 @@ def full_session(n=1003) -> SessionFile:
     turn = Pose((0.1, 1 / 3, -2e-17), (0.6, 0.0, 0.8, 0.0), (1.1, 0.7, 1 / 7))
     return SessionFile(
         PlySpec("../captures/bänk.ply", "blake2b:00ff", n, "pgsr"),
-        Recipe(
+        Edit(
             method="bbw",
             options=OptionSet(GraphOptions(cut=((1, 2),), add=((7, 3),)), AdaptationOptions(hops=2)),
             handles=(
-                HandleSpec("arm", (0.1, 0.2, 0.3), 0.25, translate=(1e-300, 2.0, 3.0)),
-                HandleSpec("leg", (1.0, 2.0, 3.0), rows=(4, 9, 1002), rotate=(0.0, 1.0, 0.0, 0.0), scale=1.5),
+                Handle("arm", (0.1, 0.2, 0.3), 0.25, translate=(1e-300, 2.0, 3.0)),
+                Handle("leg", (1.0, 2.0, 3.0), rows=(4, 9, 1002), rotate=(0.0, 1.0, 0.0, 0.0), scale=1.5),
             ),
-            pins=(PinSpec(rows=(0, 1)), PinSpec((1.0, 0.0, 0.0), 0.5, name="foot")),
+            pins=(Pin(rows=(0, 1)), Pin((1.0, 0.0, 0.0), 0.5, name="foot")),
         ),
         (HandleSettings(7, "#ff0001"), HandleSettings(3, "#00ff02", False)),
         (PinSettings(4), PinSettings(2, 0.5)),
         (3,),
         (2, 4),
-        TimelineSpec((KeySpec(1, {7: turn, 3: Pose()}), KeySpec(30, {3: turn})), 12, 48, 29.97, False, False),
+        Timeline((Key(1, {7: turn, 3: Pose()}), Key(30, {3: turn})), 12, 48, 29.97, False, False),
         ViewSpec((1.0, 2.0, 1 / 3), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 28.0, True, False, (0.0, -1.0, 0.0)),
         {"mode": "points", "size_factor": 0.3, "tints": False, "n": 3},
         rng.random(n) < 0.5,

@@ -7,9 +7,9 @@ from pathlib import Path
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QWidget
 
+from splap_editor.core.timeline import Timeline
 from splap_editor.engine.edit import Edit
 from splap_editor.engine.keyframes import edit_at_frame, keyed_edit
-from splap_editor.engine.timeline import Timeline
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.ui.actions.file_actions import sentence

@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from splap_editor.engine.timeline import LAST_FRAME, Timeline
+from splap_editor.core.timeline import LAST_FRAME, Timeline
 from splap_editor.ui.actions.file_actions import folder_to_write
 from splap_editor.ui.theme import STEP
 from splap_editor.ui.timeline.frame_export import FrameOrder

@@ -4,7 +4,7 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QContextMenuEvent, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QMenu, QSizePolicy, QWidget
 
-from splap_editor.engine.timeline import Timeline
+from splap_editor.core.timeline import Timeline
 from splap_editor.ui.theme import ACCENT, FAINT, FIELD, LINE, QUIET, STEP, TEXT
 
 MARGIN = 4 * STEP

@@ -1,4 +1,4 @@
-"""What a recipe says: handles, pins, graph and solver as plain values."""
+"""An edit as plain values: what a script writes and a recipe holds, by place or file row, of no file in particular."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ Quaternion = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
-class PinSpec:
+class Pin:
     """Splats that stay put: within a ball, or by file row.
 
     Parameters
@@ -33,7 +33,7 @@ class PinSpec:
 
 
 @dataclass(frozen=True)
-class HandleSpec:
+class Handle:
     """Splats that are moved, and where to.
 
     Parameters
@@ -73,13 +73,13 @@ class HandleSpec:
 
 
 @dataclass(frozen=True)
-class Recipe:
+class Edit:
     """An edit: which splats are moved where, what stays, and how the rest follows.
 
     Parameters
     ----------
-    handles : tuple of HandleSpec
-    pins : tuple of PinSpec
+    handles : tuple of Handle
+    pins : tuple of Pin
     method : str
         One of those in `DEFORMERS`.
     options : OptionSet
@@ -87,8 +87,8 @@ class Recipe:
         will do.
     """
 
-    handles: tuple[HandleSpec, ...] = ()
-    pins: tuple[PinSpec, ...] = ()
+    handles: tuple[Handle, ...] = ()
+    pins: tuple[Pin, ...] = ()
     method: str = "arap"
     options: OptionSet = OptionSet()
 

@@ -7,9 +7,9 @@ import pytest
 
 from splap_editor.core.bbw.rigid_curves import rigid_exp
 from splap_editor.core.handle_nodes import Region
+from splap_editor.core.timeline import Key, Timeline
 from splap_editor.engine.edit import Edit, Handle, Pose
 from splap_editor.engine.keyframes import auto_keyed_edit, edit_at_frame, keyed_edit
-from splap_editor.engine.timeline import Key, Timeline
 
 CENTERS = {1: np.array([1.0, 0.0, 0.0]), 2: np.array([-1.0, 0.5, 2.0])}
 BENT = {1: Pose((0.3, 0.0, 0.1), (0.6, 0.0, 0.8, 0.0), 1.5), 2: Pose((0.0, 0.2, 0.0))}

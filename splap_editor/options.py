@@ -1,0 +1,31 @@
+"""Option groups, for ``splap.Edit(options=[splap.options.GraphOptions(rule="paper")])``: one frozen dataclass each.
+
+`GROUPS` holds all that an edit may have, by name, those of every deformer among them.
+"""
+
+from typing import TYPE_CHECKING
+
+from splap_editor.core.graph.options import Joint, Separation
+from splap_editor.io.recipe import recipe_groups
+
+if TYPE_CHECKING:
+    from splap_editor.core.adaptation.options import AdaptationOptions
+    from splap_editor.core.arap.options import ArapOptions
+    from splap_editor.core.bbw.options import BbwOptions
+    from splap_editor.core.graph.options import GraphOptions
+    from splap_editor.core.reach_options import ReachOptions
+
+GROUPS: dict[str, type] = {group.__name__: group for _, group in recipe_groups()}
+
+globals().update(GROUPS)
+
+__all__ = [
+    "GROUPS",
+    "AdaptationOptions",
+    "ArapOptions",
+    "BbwOptions",
+    "GraphOptions",
+    "Joint",
+    "ReachOptions",
+    "Separation",
+]
