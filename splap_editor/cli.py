@@ -52,19 +52,28 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
 
     edit = commands.add_parser("edit", help="open the editor (also: splap-editor [FILE])")
-    edit.add_argument("file", nargs="?", type=Path, help="a splat PLY; the bundled sample by default")
+    edit.add_argument("file", nargs="?", type=Path, help="a splat file; the bundled sample by default")
     edit.set_defaults(run=_edit)
 
-    deform = commands.add_parser("deform", help="deform a splat PLY by a recipe")
+    deform = commands.add_parser("deform", help="deform splats by a recipe")
     _add_input(deform)
     _add_edit(deform, required=True)
     _add_frames(deform, "write a PLY for each frame of a session's timeline")
-    deform.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.ply")
+    deform.add_argument(
+        "-o", "--output", required=True, type=Path, metavar="OUT", help="a PLY, or what its ending names"
+    )
     deform.add_argument("--as-3dgs", action="store_true", help="add a thin third scale to a file of two")
     deform.add_argument("--columns", default="", metavar="NAMES", help="also write quantities: displacement,stretch")
     deform.add_argument("--no-cache", action="store_true", help="neither read nor keep graph and Laplacian")
     _add_output(deform)
     deform.set_defaults(run=_deform)
+
+    convert = commands.add_parser("convert", help="write a splat file in another format")
+    _add_input(convert)
+    convert.add_argument("-o", "--output", required=True, type=Path, metavar="OUT", help="its ending names the format")
+    convert.add_argument("--as-3dgs", action="store_true", help="add a thin third scale to a file of two")
+    _add_output(convert)
+    convert.set_defaults(run=_convert)
 
     render = commands.add_parser("render", help="draw a picture, the frames of an animation, or a turn all round")
     _add_input(render)
@@ -96,7 +105,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _add_input(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", type=Path, metavar="IN.ply")
+    parser.add_argument("file", type=Path, metavar="IN", help="a splat file of any format")
     parser.add_argument("--layout", help="read the file as this layout instead of the recognised one")
 
 
@@ -159,18 +168,23 @@ def _deform(options: argparse.Namespace) -> int:
     from splap_editor.engine.quantities import column_names
     from splap_editor.engine.scripting import write_posed
     from splap_editor.frames_cli import deform_frames, edit_for, read_edit_file
-    from splap_editor.io.ply import read_ply
+    from splap_editor.io.formats.table import format_to_write
+    from splap_editor.io.splat_files import losses_of_saving, read_splats
     from splap_editor.session.side_by_side import side_by_side
 
     if options.frames is not None:
         return deform_frames(options)
     report = StageReport(quiet=options.quiet or options.json)
+    row = format_to_write(options.output)
     columns = column_names(options.columns)
     held = read_edit_file(options)
     with report("read"):
-        file = read_ply(options.file, layout=options.layout, progress=report.progress)
+        file = read_splats(options.file, layout=options.layout, progress=report.progress)
     for warning in file.warnings:
         report.say(f"note: {warning}")
+    lost = losses_of_saving(file, row)
+    for loss in lost:
+        report.say(f"lost in {options.output.name}: {loss}")
     edit = edit_for(held, file, report.say)
     cache = None if options.no_cache else StageCache(say=lambda text: report.say(f"note: {text}"))
     made = posed(file, edit, cache=cache, stages=report.stage, run=side_by_side(), with_surface=bool(columns))
@@ -186,21 +200,55 @@ def _deform(options: argparse.Namespace) -> int:
         "residual": _known(deformation.residual) if deformation is not None else 0.0,
         "n_iterations": deformation.n_iterations if deformation is not None else 0,
         "warnings": file.warnings,
+        "losses": lost,
         "timings_s": report.timings_s,
     }
     print(json.dumps({name: value for name, value in told.items() if name != "path"}))
     return EXIT_OK
 
 
+def _convert(options: argparse.Namespace) -> int:
+    from splap_editor.io.formats.table import endings_to_write, format_named, format_to_write
+    from splap_editor.io.splat_files import FormatError, losses_of_saving, read_splats, write_splats
+
+    report = StageReport(quiet=options.quiet or options.json)
+    if format_named(options.output) is None:
+        raise FormatError(
+            f"{options.output.name} ends in no known format. Choose a name with one of {endings_to_write()}."
+        )
+    row = format_to_write(options.output)
+    with report("read"):
+        file = read_splats(options.file, layout=options.layout, progress=report.progress)
+    for warning in file.warnings:
+        report.say(f"note: {warning}")
+    lost = losses_of_saving(file, row)
+    for loss in lost:
+        report.say(f"lost in {options.output.name}: {loss}")
+    with report("write"):
+        write_splats(options.output, file, file.splats, as_3dgs=options.as_3dgs, progress=report.progress)
+    if options.json:
+        told = {
+            "n_splats": file.splats.n_splats,
+            "from": file.format_name,
+            "to": row.name,
+            "output": str(options.output),
+        }
+        print(json.dumps({**told, "warnings": file.warnings, "losses": lost, "timings_s": report.timings_s}))
+    else:
+        report.say(f"{options.output.name}: {file.splats.n_splats:,} splats as {row.title}")
+    return EXIT_OK
+
+
 def _info(options: argparse.Namespace) -> int:
     from splap_editor.engine.scene_info import graph_info, scene_info
-    from splap_editor.io.ply import read_ply
+    from splap_editor.io.splat_files import losses_by_format, read_splats
 
     report = StageReport(quiet=options.quiet or options.json)
     with report("read"):
-        file = read_ply(options.file, layout=options.layout, progress=report.progress)
+        file = read_splats(options.file, layout=options.layout, progress=report.progress)
     with report("occupancy"):
         info, ellipses = scene_info(file)
+        info["saving_loses"] = losses_by_format(file)
     if options.graph:
         from splap_editor.engine.surface import surface_of
 
@@ -221,11 +269,11 @@ def _graph(options: argparse.Namespace) -> int:
     from splap_editor.core.splats.occupancy import occupancy_ellipses
     from splap_editor.engine.scene_info import graph_info
     from splap_editor.io.edges_ply import write_edges_ply
-    from splap_editor.io.ply import read_ply
+    from splap_editor.io.splat_files import read_splats
 
     report = StageReport(quiet=options.quiet or options.json)
     with report("read"):
-        file = read_ply(options.file, layout=options.layout, progress=report.progress)
+        file = read_splats(options.file, layout=options.layout, progress=report.progress)
     with report("occupancy"):
         ellipses = occupancy_ellipses(file.splats)
     with report("graph"):
@@ -243,7 +291,7 @@ def _graph(options: argparse.Namespace) -> int:
     return EXIT_OK
 
 
-_COMMANDS = ("edit", "deform", "render", "info", "graph", *installation.NAMES)
+_COMMANDS = ("edit", "deform", "convert", "render", "info", "graph", *installation.NAMES)
 
 
 def _readable(info: dict, indent: str = "") -> str:

@@ -33,12 +33,13 @@ def read_edit_file(options: argparse.Namespace) -> plain.Edit | SessionFile | No
 def edit_for(held: plain.Edit | SessionFile | None, file: "SplatFile", say: Callable[[str], None]) -> "Edit":
     """Make an edit of a recipe or session for a file; says so where the session was made for another."""
     from splap_editor.engine.edit import Edit
-    from splap_editor.engine.recipe_edit import edit_of
+    from splap_editor.engine.recipe_edit import edit_of, require_rows_fit
     from splap_editor.session.saved_state import session_edit
 
     if held is None:
         return Edit()
     if isinstance(held, plain.Edit):
+        require_rows_fit(held, file)
         return edit_of(held, file.splats)
     if held.ply.content_hash and content_hash(file.path) != held.ply.content_hash:
         say(f"note: {file.path.name} is not the file that the session was saved with, or has changed since")
@@ -113,12 +114,12 @@ def _prepared(
     from splap_editor.engine.cache import StageCache
     from splap_editor.engine.frames import frame_poser
     from splap_editor.engine.surface import surface_of
-    from splap_editor.io.ply import read_ply
+    from splap_editor.io.splat_files import read_splats
     from splap_editor.session.side_by_side import side_by_side
 
     layout = options.layout or (held.ply.layout if isinstance(held, SessionFile) else None)
     with report("read"):
-        file = read_ply(options.file, layout=layout, progress=report.progress)
+        file = read_splats(options.file, layout=layout, progress=report.progress)
     for warning in file.warnings:
         report.say(f"note: {warning}")
     edit = edit_for(held, file, report.say)

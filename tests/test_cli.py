@@ -12,6 +12,7 @@ import pytest
 
 from splap_editor.cli import main
 from splap_editor.io.ply import read_ply
+from splap_editor.io.splat_files import read_splats
 from splap_editor.resources import resource
 
 TUBE = resource("samples", "tube.ply")
@@ -231,3 +232,35 @@ def test_the_plain_solvers_run_and_own_up_to_an_unknown_residual(kind, tmp_path,
     summary = json.loads(capsys.readouterr().out)
     assert summary["residual"] is None and summary["n_iterations"] == 3
     assert summary["n_changed"] > 0
+
+
+@pytest.mark.parametrize("ending", ["spz", "sog", "compressed.ply"])
+def test_convert_says_what_is_lost_before_it_writes(ending, tmp_path, capsys):
+    out, back = tmp_path / f"out.{ending}", tmp_path / "back.ply"
+    assert main(["convert", str(TUBE), "-o", str(out)]) == 0
+    told = capsys.readouterr()
+    assert told.out == ""
+    lines = told.err.splitlines()
+    lost = [i for i, line in enumerate(lines) if line.startswith(f"lost in {out.name}: ")]
+    assert lost and max(lost) < next(i for i, line in enumerate(lines) if line.startswith("write"))
+    assert main(["convert", str(out), "-o", str(back), "--json"]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["n_splats"] == read_ply(TUBE).splats.n_splats == read_ply(back).splats.n_splats
+    assert summary["losses"] == []
+    assert main(["info", str(out), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["n_splats"] == summary["n_splats"]
+
+
+@pytest.mark.parametrize(("name", "words"), [("out.xyz", "ends in no known format"), ("out.splat", "only read")])
+def test_convert_refuses_what_it_cannot_write(name, words, tmp_path, capsys):
+    assert main(["convert", str(TUBE), "-o", str(tmp_path / name)]) == 2
+    assert words in capsys.readouterr().err
+    assert not (tmp_path / name).exists()
+
+
+def test_deform_writes_what_the_ending_names(tmp_path, recipe, capsys):
+    out = tmp_path / "out.spz"
+    assert main(["deform", str(TUBE), "--recipe", str(recipe), "-o", str(out), "--json"]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert any("rounded" in loss for loss in summary["losses"])
+    assert read_splats(out).splats.n_splats == summary["n_splats"]

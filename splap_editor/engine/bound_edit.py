@@ -24,7 +24,7 @@ from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.cache import StageCache, content_key
 from splap_editor.engine.edit import Edit
 from splap_editor.engine.quantities import Snapshot
-from splap_editor.engine.recipe_edit import edit_of
+from splap_editor.engine.recipe_edit import edit_of, require_rows_fit
 from splap_editor.engine.sources import source_hash
 from splap_editor.engine.surface import Surface, surface_of
 from splap_editor.io import plain_edit as plain
@@ -221,7 +221,9 @@ def posed(
     with_surface : bool
         Make the surface in any case.
     """
-    edit = edit_of(edit, file.splats) if isinstance(edit, plain.Edit) else edit
+    if isinstance(edit, plain.Edit):
+        require_rows_fit(edit, file)
+        edit = edit_of(edit, file.splats)
     if not edit.active_handles and not with_surface:
         return Posed(file.splats)
     surface = surface_of(file.splats, edit.graph, cache=cache, stages=stages)

@@ -12,7 +12,7 @@ from splap_editor.engine.cache import StageCache
 from splap_editor.engine.edit import Edit
 from splap_editor.engine.keyframes import edit_at_frame
 from splap_editor.engine.surface import Surface
-from splap_editor.io.ply import SplatFile, write_ply
+from splap_editor.io.splat_files import SplatFile, write_splats
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +86,7 @@ def write_frames(
     as_3dgs: bool = False,
     progress: Progress = no_progress,
 ) -> list[Path]:
-    """Write a PLY for each frame.
+    """Write a splat file for each frame.
 
     Parameters
     ----------
@@ -109,8 +109,8 @@ def write_frames(
     for done, kernels in _posed(poser, frames, progress):
         frame = frames[done]
         written.append(frame_path(path, frame, frames[-1]))
-        write_ply(written[-1], file, file.splats if kernels is None else adapted_splats(file.splats, kernels),
-                  as_3dgs=as_3dgs)  # fmt: skip
+        splats = file.splats if kernels is None else adapted_splats(file.splats, kernels)
+        write_splats(written[-1], file, splats, as_3dgs=as_3dgs)
         progress((done + 1) / len(frames))
     return written
 

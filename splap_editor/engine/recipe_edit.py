@@ -2,12 +2,16 @@
 
 import numpy as np
 
+from splap_editor.core.graph.options import GraphOptions
 from splap_editor.core.handle_nodes import Region
 from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.edit import HANDLE_COLORS, Edit, Handle, Pin
 from splap_editor.io import plain_edit as plain
+from splap_editor.io.formats.table import FORMATS
 from splap_editor.io.plain_edit import Vector
 from splap_editor.io.recipe import RecipeError
+from splap_editor.io.session_file import content_hash
+from splap_editor.io.splat_files import SplatFile
 
 
 def recipe_of(edit: Edit, *, with_disabled: bool = False) -> plain.Edit:
@@ -58,6 +62,31 @@ def edit_of(recipe: plain.Edit, splats: Splats) -> Edit:
 def _pin_name(number: int) -> str:
     """Name of a pin that a recipe gives none."""
     return f"Pin {number}"
+
+
+def require_rows_fit(recipe: plain.Edit, file: SplatFile) -> None:
+    """Refuse a recipe that names rows of another file, where a format has an order of rows of its own.
+
+    Raises
+    ------
+    RecipeError
+        The recipe names rows, and it is not known that this file's are meant.
+    """
+    graph = recipe.options[GraphOptions]
+    regions: list[plain.Handle | plain.Pin] = [*recipe.handles, *recipe.pins]
+    names_rows = any(spec.rows is not None for spec in regions) or graph.cut or graph.add
+    if not names_rows or not (recipe.rows_of or FORMATS[file.format_name].reorders):
+        return
+    if recipe.rows_of != content_hash(file.path):
+        raise RecipeError(
+            f"the edit names rows, and those of {file.path.name} stand in another order than in the file it was made "
+            "for: use that file, or give handles and pins by center and radius"
+        )
+
+
+def rows_of(file: SplatFile) -> str:
+    """What a recipe made for a file says as ``rows_of``."""
+    return content_hash(file.path) if FORMATS[file.format_name].reorders else ""
 
 
 def _handle_spec(handle: Handle) -> plain.Handle:

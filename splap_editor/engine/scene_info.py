@@ -21,6 +21,7 @@ def scene_info(file: SplatFile) -> tuple[dict, Ellipses]:
     ellipses = occupancy_ellipses(splats)
     info = {
         "n_splats": splats.n_splats,
+        "format": file.format_name,
         "layout": file.layout.name,
         "layout_reason": file.layout.reason,
         "sh_degree": splats.sh_degree,

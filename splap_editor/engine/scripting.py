@@ -13,7 +13,7 @@ from splap_editor.engine.export_report import ExportReport, export_report
 from splap_editor.engine.quantities import columns_of
 from splap_editor.engine.surface import Surface, surface_of
 from splap_editor.io import plain_edit as plain
-from splap_editor.io.ply import SplatFile, read_ply, write_ply
+from splap_editor.io.splat_files import SplatFile, read_splats, write_splats
 
 
 def prepare(
@@ -49,7 +49,7 @@ def deform(
     stages: StageProgress = silent,
     run: Runner = in_turn,
 ) -> ExportReport:
-    """Read a splat PLY, deform it and write it: what `read_ply`, `prepare`, `bind`, `pose` and `write_ply` do in turn.
+    """Read splats, deform and write them: what `read_splats`, `prepare`, `bind`, `pose`, `write_splats` do in turn.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def deform(
     cache, stages, run
         As of `posed`.
     """
-    file = read_ply(source, layout=layout, progress=stages("read"))
+    file = read_splats(source, layout=layout, progress=stages("read"))
     made = posed(file, edit, cache=cache, stages=stages, run=run, with_surface=bool(columns))
     return write_posed(output, file, made, columns=columns, as_3dgs=as_3dgs, stages=stages)
 
@@ -79,7 +79,7 @@ def write_posed(
     as_3dgs: bool = False,
     stages: StageProgress = silent,
 ) -> ExportReport:
-    """Write posed splats as the file they came from, and say what changed.
+    """Write posed splats, as a PLY with only what changed changed, and say what changed.
 
     Parameters
     ----------
@@ -98,5 +98,5 @@ def write_posed(
     splats = made.splats
     progress = stages("write")
     extra = columns_of(columns, made.snapshot) if columns else {}
-    write_ply(path, file, splats, as_3dgs=as_3dgs, extra=extra, progress=progress)
+    write_splats(path, file, splats, as_3dgs=as_3dgs, extra=extra, progress=progress)
     return export_report(Path(path), file.splats, made.kernels)

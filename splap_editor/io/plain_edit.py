@@ -85,12 +85,16 @@ class Edit:
     options : OptionSet
         `GraphOptions`, `ReachOptions`, `AdaptationOptions`, and those of every deformer; any iterable of such groups
         will do.
+    rows_of : str
+        Content hash of the only file that rows may be meant of, ``"blake2b:…"``; empty where any file of that many
+        rows will do. Formats that put rows in an order of their own need it.
     """
 
     handles: tuple[Handle, ...] = ()
     pins: tuple[Pin, ...] = ()
     method: str = "arap"
     options: OptionSet = OptionSet()
+    rows_of: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "handles", tuple(self.handles))

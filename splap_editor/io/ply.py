@@ -12,6 +12,7 @@ from splap_editor.core.pose import LARGEST_COORDINATE
 from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.splats.splats import Splats
 from splap_editor.io.atomic_file import atomic_file
+from splap_editor.io.formats.bare_splats import THIN_LOG_SCALE
 from splap_editor.io.layout import COMMON_NAMES, Layout, PlyEvidence
 from splap_editor.io.layouts import layout_of, require_splats
 from splap_editor.io.lint import unusable_rows
@@ -21,15 +22,12 @@ from splap_editor.io.ply_table import NewColumn, PlyTable, field_types
 from splap_editor.io.splat_cells import SplatCells, any_stored_difference, plain_table
 from splap_editor.io.splat_columns import SplatColumns, splat_columns
 
-__all__ = ["PlyError", "SplatFile", "read_ply", "write_ply"]
-
-THIN_LOG_SCALE = float(np.log(1e-6))
-"""Third log-scale given to 2DGS splats on their way to 3DGS programs."""
+__all__ = ["PlyError", "SplatFile", "read_ply", "splat_file", "write_ply"]
 
 
 @dataclass(frozen=True, eq=False)
 class SplatFile:
-    """A splat PLY in memory.
+    """A splat file in memory.
 
     Parameters
     ----------
@@ -38,11 +36,13 @@ class SplatFile:
     splats : Splats
         Its splats in file order; arrays may be views into ``table``.
     table : PlyTable
-        Its bytes and columns.
+        Its bytes and columns; of another format than PLY, those of the PLY that its splats make.
     layout : Layout
         Which trainer wrote it, how that was recognised, what its columns mean.
     warnings : list of str
         Sentences about what is odd; such rows are kept as they are.
+    format_name : str
+        Key of `splap_editor.io.formats.table.FORMATS`.
     """
 
     path: Path
@@ -50,6 +50,7 @@ class SplatFile:
     table: PlyTable
     layout: Layout
     warnings: list[str]
+    format_name: str = "ply"
 
 
 def read_ply(path: str | os.PathLike[str], *, layout: str | None = None, progress: Progress = no_progress) -> SplatFile:
@@ -78,14 +79,38 @@ def read_ply(path: str | os.PathLike[str], *, layout: str | None = None, progres
     table = read_table(path, accepts=require_splats, glance=glance.look, progress=part_of(progress, 0.0, 0.9))
     evidence = PlyEvidence(table, path)
     found = layout_of(evidence, chosen=layout)
-    splats, warnings = found.splats(evidence, found)
-    if found.bound:
-        warnings.append(_BOUND.format(found.name))
-    if found.activated_opacity or not glance.shows_only_usable_rows(table.n_rows):
-        _require_usable_positions(splats.means, path.name)
-        warnings += [f"{finding.sentence}; left as they are." for finding in unusable_rows(splats)]
+    file = splat_file(evidence, found, is_usable=glance.shows_only_usable_rows(table.n_rows))
     progress(1.0)
-    return SplatFile(path, splats, table, found, warnings)
+    return file
+
+
+def splat_file(
+    evidence: PlyEvidence, layout: Layout, *, format_name: str = "ply", is_usable: bool = False
+) -> SplatFile:
+    """Make splats of a table, and look for what is odd about them.
+
+    Parameters
+    ----------
+    evidence : PlyEvidence
+    layout : Layout
+        What its columns mean.
+    format_name : str
+        As of `SplatFile`.
+    is_usable : bool
+        All its numbers are known to be finite, and its rotations none of zeros.
+
+    Raises
+    ------
+    PlyError
+        If its columns make no splats, or a position is no place.
+    """
+    splats, warnings = layout.splats(evidence, layout)
+    if layout.bound:
+        warnings.append(_BOUND.format(layout.name))
+    if layout.activated_opacity or not is_usable:
+        _require_usable_positions(splats.means, evidence.path.name)
+        warnings += [f"{finding.sentence}; left as they are." for finding in unusable_rows(splats)]
+    return SplatFile(evidence.path, splats, evidence.table, layout, warnings, format_name)
 
 
 class _Glance:

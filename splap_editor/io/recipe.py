@@ -52,7 +52,7 @@ def recipe_groups() -> tuple[tuple[str, type], ...]:
 def recipe_keys() -> tuple[str, ...]:
     """Keys that a recipe may have."""
     keys = [key for key, group in recipe_groups() for key in ([key] if key else options_of(group))]
-    return ("version", "preset", "method", "handles", "pins", *keys)
+    return ("version", "preset", "method", "rows_of", "handles", "pins", *keys)
 
 
 class RecipeError(ValueError):
@@ -131,6 +131,7 @@ def recipe_from_json(value: Any) -> Edit:
         pins=tuple(Pin(*_region(pin), pin.text("name", "")) for pin in recipe.objects("pins", PIN_KEYS)),
         method=recipe.choice("method", tuple(method_titles()), Edit.method),
         options=OptionSet(*groups),
+        rows_of=recipe.text("rows_of", ""),
     )
 
 
@@ -197,6 +198,8 @@ def _scale(handle: JsonObject) -> float | Vector:
 def recipe_to_json(recipe: Edit) -> dict[str, Any]:
     """Plain objects of a recipe for ``json``; what is left at its default is left out."""
     value: dict[str, Any] = {"version": VERSION, "method": recipe.method}
+    if recipe.rows_of:
+        value["rows_of"] = recipe.rows_of
     said = {(key, group): _said(recipe.options[group]) for key, group in recipe_groups()}
     # The keys of the first version stand where they stood.
     for key, group in (("graph", GraphOptions), ("", ReachOptions)):

@@ -18,6 +18,7 @@ _ROW = {"type": "integer", "minimum": 0, "exclusiveMaximum": 2**31}
 _PAIR = {"type": "array", "items": _ROW, "minItems": 2, "maxItems": 2, "uniqueItems": True}
 _POINT = {"type": "number", "minimum": -LARGEST_COORDINATE, "maximum": LARGEST_COORDINATE}
 _SCALE = {"type": "number", "minimum": SCALES[0], "maximum": SCALES[1]}
+_ROWS_OF = "Content hash of the file that rows are meant of, where its format has an order of rows of its own."
 _POSITIVE = {"type": "number", "exclusiveMinimum": 0}
 
 
@@ -35,6 +36,7 @@ def recipe_schema() -> dict[str, Any]:
             + " ".join(f"{name}: {preset.sentence}" for name, preset in PRESETS.items()),
         },
         "method": {"enum": list(method_titles()), "default": next(iter(method_titles()))},
+        "rows_of": {"type": "string", "default": "", "description": _ROWS_OF},
         "handles": {"type": "array", "items": _placed(_handle_properties())},
         "pins": {"type": "array", "items": _placed({"name": {"type": "string", "default": ""}})},
     }

@@ -165,22 +165,58 @@ def _rotated(quats: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArra
 
 def plain_table(name: str, splats: Splats) -> PlyTable:
     """Lay splats out as a 3DGS file in memory: INRIA's columns, float32, normals zero."""
-    n, n_coefficients = splats.n_splats, splats.shN.shape[1]
+    table, sheet = blank_table(name, splats.n_splats, splats.shN.shape[1], splats.n_scales)
+    for part in ("means", "log_scales", "quats", "logit_opacities", "sh0", "shN"):
+        getattr(sheet, part)[...] = getattr(splats, part)
+    return table
+
+
+def blank_table(name: str, n_splats: int, n_coefficients: int, n_scales: int = 3) -> tuple[PlyTable, Splats]:
+    """Make a 3DGS file in memory whose numbers are still to be filled in.
+
+    Parameters
+    ----------
+    name : str
+        File name, for messages.
+    n_splats : int
+        Rows N.
+    n_coefficients : int
+        Spherical-harmonic coefficients K of degrees 1 and up.
+    n_scales : int
+        2 or 3.
+
+    Returns
+    -------
+    table : PlyTable
+        INRIA's columns, float32, normals zero.
+    splats : Splats
+        Writable views into it, to fill.
+    """
     groups = [
-        ("xyz", splats.means),
-        (("nx", "ny", "nz"), np.zeros((n, 3), np.float32)),
-        ([f"f_dc_{i}" for i in range(3)], splats.sh0),
-        (
-            [f"f_rest_{i}" for i in range(3 * n_coefficients)],
-            splats.shN.transpose(0, 2, 1).reshape(n, 3 * n_coefficients),
-        ),
-        (["opacity"], splats.logit_opacities[:, None]),
-        ([f"scale_{i}" for i in range(splats.n_scales)], splats.log_scales),
-        ([f"rot_{i}" for i in range(4)], splats.quats),
+        ("x", "y", "z"),
+        ("nx", "ny", "nz"),
+        tuple(f"f_dc_{i}" for i in range(3)),
+        tuple(f"f_rest_{i}" for i in range(3 * n_coefficients)),
+        ("opacity",),
+        tuple(f"scale_{i}" for i in range(n_scales)),
+        tuple(f"rot_{i}" for i in range(4)),
     ]
-    names = [column for columns, _ in groups for column in columns]
-    body = np.concatenate([np.asarray(values, "<f4") for _, values in groups], axis=1)
-    lines = ["ply", "format binary_little_endian 1.0", f"element vertex {n}"]
+    names = [column for columns in groups for column in columns]
+    rows = np.empty((n_splats, len(names)), "<f4")
+    ends = np.cumsum([len(columns) for columns in groups])
+    means, normals, sh0, rest, opacities, log_scales, quats = (
+        rows[:, end - len(columns) : end] for columns, end in zip(groups, ends, strict=True)
+    )
+    normals[...] = 0
+    sheet = Splats(
+        means=means,
+        log_scales=log_scales,
+        quats=quats,
+        logit_opacities=opacities[:, 0],
+        sh0=sh0,
+        shN=rest.reshape(n_splats, 3, n_coefficients).transpose(0, 2, 1),
+    )
+    lines = ["ply", "format binary_little_endian 1.0", f"element vertex {n_splats}"]
     lines += [f"property float {column}" for column in names] + ["end_header", ""]
     header = ply_header("\n".join(lines).encode(), name)
-    return binary_table(name, header, body.reshape(-1).view(np.uint8))
+    return binary_table(name, header, rows.reshape(-1).view(np.uint8)), sheet

@@ -1,6 +1,7 @@
 """One open scene, its history and its background work: what the window and its tools talk to."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from splap_editor.engine.bound_edit import BoundEdit
 from splap_editor.engine.cache import StageCache
 from splap_editor.engine.edit import HANDLE_COLORS, Edit, Handle, Pin
 from splap_editor.engine.keyframes import auto_keyed_edit
-from splap_editor.engine.recipe_edit import edit_of, recipe_of
+from splap_editor.engine.recipe_edit import edit_of, recipe_of, require_rows_fit, rows_of
 from splap_editor.io.recipe import read_recipe, write_recipe
 from splap_editor.session.commands import ChangeEdit, ChangeMask
 from splap_editor.session.depictor import Depictor, Unseen
@@ -141,11 +142,14 @@ class Session:
 
     def save_edit(self, path: Path) -> None:
         """Write the edit as a recipe for ``splap-editor deform``."""
-        write_recipe(path, recipe_of(self.shown_scene.edit))
+        scene = self.shown_scene
+        write_recipe(path, replace(recipe_of(scene.edit), rows_of=rows_of(scene.file)))
 
     def open_edit(self, path: Path) -> None:
         """Replace the edit by a recipe's, as one undoable step."""
-        self.change_edit(edit_of(read_recipe(path), self.shown_scene.splats), "Open edit")
+        scene, recipe = self.shown_scene, read_recipe(path)
+        require_rows_fit(recipe, scene.file)
+        self.change_edit(edit_of(recipe, scene.splats), "Open edit")
 
     # ------------------------------------------------------------------ edits
 

@@ -17,7 +17,7 @@ from splap_editor.engine.edit import Edit
 from splap_editor.engine.export_report import ExportReport, export_report
 from splap_editor.engine.quantities import Snapshot, columns_of
 from splap_editor.engine.surface import Surface, surface_of
-from splap_editor.io.ply import SplatFile, read_ply, write_ply
+from splap_editor.io.splat_files import SplatFile, read_splats, write_splats
 from splap_editor.session.depictor import Depictor, HandOver
 from splap_editor.session.jobs import Job
 from splap_editor.session.scene import Scene
@@ -53,8 +53,8 @@ class OpenedScene:
 
 
 def opened_scene(job: Job, request: OpenRequest) -> OpenedScene:
-    """Read a splat PLY and find its ellipses."""
-    file = read_ply(request.path, layout=request.layout, progress=job.progress("reading"))
+    """Read a splat file and find its ellipses."""
+    file = read_splats(request.path, layout=request.layout, progress=job.progress("reading"))
     job.report(1.0, "occupancy")
     scene = Scene(file, occupancy_ellipses(file.splats))
     hand_over = request.depictor.depict(file.splats)
@@ -168,7 +168,7 @@ def _made_pose(request: PoseRequest, posed: Posed) -> MadePose:
 
 @dataclass(frozen=True, eq=False)
 class ExportOrder:
-    """A PLY to be written once the splats have settled.
+    """A splat file to be written once the splats have settled.
 
     Parameters
     ----------
@@ -202,5 +202,5 @@ def exported_file(job: Job, request: ExportRequest) -> ExportReport:
     file, kernels, order = request.file, request.kernels, request.order
     splats = file.splats if kernels is None else adapted_splats(file.splats, kernels)
     extra = columns_of(order.columns, request.snapshot)
-    write_ply(order.path, file, splats, extra=extra, progress=job.progress("writing"), as_3dgs=order.as_3dgs)
+    write_splats(order.path, file, splats, extra=extra, progress=job.progress("writing"), as_3dgs=order.as_3dgs)
     return export_report(order.path, file.splats, kernels)

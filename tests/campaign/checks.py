@@ -16,9 +16,12 @@ from splap_editor.engine.cache import _HEAD, _MAGIC, StageCache
 from splap_editor.engine.edit import Edit, Handle
 from splap_editor.engine.scene_info import scene_info
 from splap_editor.engine.surface import surface_of
+from splap_editor.io.formats.source import FormatError
+from splap_editor.io.formats.table import FORMATS
 from splap_editor.io.ply import PlyError, SplatFile, read_ply, write_ply
 from splap_editor.io.recipe import RecipeError, read_recipe, write_recipe
 from splap_editor.io.session_file import SessionFileError, read_session_file, write_session_file
+from splap_editor.io.splat_files import losses_of_saving, read_splats, write_splats
 from splap_editor.io.thresholds import Thresholds, read_thresholds
 
 SHIFT = np.array([1.0, 2.0, -1.0])
@@ -70,6 +73,27 @@ def _check_deformed(out: Path, file: SplatFile) -> None:
         assert "splat" in str(error) or "handle" in str(error), error
         return
     read_ply(out)
+
+
+def check_splats(path: Path, number: int) -> bool:
+    """Whether a splat file of any format is accepted; then it goes out as others, and what went out is read."""
+    try:
+        file = read_splats(path)
+    except (PlyError, FormatError) as error:
+        assert path.name in str(error) and str(error).endswith((".", "?")), f"no sentence: {error}"
+        return False
+    for row in FORMATS.values():
+        if row.can_be_written:
+            out = path.with_name(f"out{row.suffixes[0]}")
+            losses_of_saving(file, row)
+            try:
+                write_splats(out, file, file.splats)
+            except (PlyError, FormatError) as error:
+                assert "position" in str(error) or "cannot hold" in str(error), error
+                continue
+            assert read_splats(out).splats.n_splats == file.splats.n_splats
+    scene_info(file)
+    return True
 
 
 def check_recipe(path: Path, number: int) -> bool:
@@ -128,4 +152,6 @@ def check_cache(path: Path, number: int) -> bool:
     return found is not None
 
 
+OTHER_FORMATS = ("spz", "sog", "ksplat", "splat")
 CHECKS = {"ply": check_ply, "recipe": check_recipe, "session": check_session, "npz": check_npz, "cache": check_cache}
+CHECKS |= dict.fromkeys(OTHER_FORMATS, check_splats)

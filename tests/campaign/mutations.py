@@ -1,7 +1,11 @@
 """Changes to a file: to what its format means, and to its bytes. Each is a function of the bytes and a generator."""
 
+import gzip
+import io
 import json
 import re
+import zipfile
+import zlib
 from collections.abc import Callable
 
 import numpy as np
@@ -133,6 +137,36 @@ def json_value(data: bytes, rng: np.random.Generator) -> bytes:
     return json.dumps(held).encode()
 
 
+def unpacked_bytes(data: bytes, rng: np.random.Generator) -> bytes:
+    """Bytes inside a gzip, or of a member of a zip, changed and packed again."""
+    change = BYTES[int(rng.integers(len(BYTES)))]
+    if data[:2] == b"\x1f\x8b":
+        try:
+            return gzip.compress(change(gzip.decompress(data), rng), 1)
+        except (OSError, EOFError, zlib.error):
+            return data
+    return _with_member(data, rng, None, change)
+
+
+def member_value(data: bytes, rng: np.random.Generator) -> bytes:
+    """A value in the meta.json of a zip becomes another."""
+    return _with_member(data, rng, "meta.json", json_value)
+
+
+def _with_member(data: bytes, rng: np.random.Generator, name: str | None, change: Mutation) -> bytes:
+    out = io.BytesIO()
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as old, zipfile.ZipFile(out, "w") as new:
+            names = old.namelist()
+            chosen = name or names[int(rng.integers(len(names)))]
+            for each in names:
+                new.writestr(each, change(old.read(each), rng) if each == chosen else old.read(each))
+    # A zip that was broken before stays as it is.
+    except Exception:
+        return data
+    return out.getvalue()
+
+
 BYTES: tuple[Mutation, ...] = (flip_bits, truncate, repeat_or_drop, odd_bytes)
 MUTATIONS: dict[str, tuple[Mutation, ...]] = {
     "ply": (header_token, header_token, header_lines, text_token, odd_floats, odd_floats, *BYTES),
@@ -140,6 +174,10 @@ MUTATIONS: dict[str, tuple[Mutation, ...]] = {
     "session": (json_value, json_value, json_value, text_token, *BYTES),
     "npz": (flip_bits, *BYTES),
     "cache": (flip_bits, *BYTES),
+    "spz": (unpacked_bytes, unpacked_bytes, *BYTES),
+    "sog": (member_value, member_value, unpacked_bytes, *BYTES),
+    "ksplat": (odd_floats, *BYTES),
+    "splat": (odd_floats, *BYTES),
 }
 
 

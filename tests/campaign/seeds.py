@@ -1,13 +1,20 @@
 """Sound files that the mutations start from, each made from a number."""
 
+import gzip
 import json
+import struct
 from collections.abc import Callable
 from functools import cache
 from io import BytesIO
 
 import numpy as np
 from hypothesis import strategies as st
+from zstandard import ZstdCompressor
 
+from splap_editor.core.progress import no_progress
+from splap_editor.core.splats.splats import Splats
+from splap_editor.io.formats.splat32 import RECORD
+from splap_editor.io.formats.table import FORMATS as FORMATS_OF_SPLATS
 from tests.reference.ply import compressed_bytes, ply_bytes, splat_columns
 
 FORMATS = ("binary_little_endian", "binary_big_endian", "ascii")
@@ -111,5 +118,70 @@ def npz(number: int) -> bytes:
     return data.getvalue()
 
 
+@cache
+def _other(ending: str, which: int) -> bytes:
+    """A small file of another format."""
+    rng = np.random.default_rng(which)
+    n, degree = int(rng.integers(1, 12)), int(rng.integers(0, 4))
+    n_rest = (degree + 1) ** 2 - 1
+    if ending == "splat":
+        return _splat_records(n, rng).tobytes()
+    if ending == "ksplat":
+        return _ksplat_bytes(n, rng)
+    quats = rng.normal(size=(n, 4)).astype("f4")
+    splats = Splats(
+        means=rng.normal(size=(n, 3)).astype("f4"),
+        log_scales=rng.uniform(-6, -1, (n, 3)).astype("f4"),
+        quats=quats / np.linalg.norm(quats, axis=1)[:, None],
+        logit_opacities=rng.normal(size=n).astype("f4"),
+        sh0=rng.normal(size=(n, 3)).astype("f4"),
+        shN=rng.normal(size=(n, n_rest, 3)).astype("f4"),
+    )
+    out = BytesIO()
+    FORMATS_OF_SPLATS[ending].write(out, splats, no_progress)
+    if ending == "spz" and which % 2:
+        return _spz_4(gzip.decompress(out.getvalue()), n, degree)
+    return out.getvalue()
+
+
+def _splat_records(n: int, rng: np.random.Generator) -> np.ndarray:
+    records = np.zeros(n, RECORD)
+    records["mean"] = rng.normal(size=(n, 3))
+    records["scale"] = rng.random((n, 3))
+    records["rgba"] = rng.integers(0, 256, (n, 4))
+    records["quat"] = (255, 128, 128, 128)
+    return records
+
+
+def _ksplat_bytes(n: int, rng: np.random.Generator) -> bytes:
+    level = int(rng.integers(3))
+    degree = int(rng.integers(3))
+    head, section = bytearray(4096), bytearray(1024)
+    head[1] = 1
+    struct.pack_into("<IIIIH", head, 4, 1, 1, n, n, level)
+    struct.pack_into("<IIIIfHxxI", section, 0, n, n, 4, 2 if n > 4 else 1, 5.0, 12, 0)
+    n_full = min(n // 4, 1)
+    struct.pack_into("<II", section, 32, n_full, 1)
+    struct.pack_into("<H", section, 40, degree)
+    width = (44, 24, 24)[level] + (4, 2, 1)[level] * (0, 9, 24)[degree]
+    partial = struct.pack("<I", n - 4 * n_full)
+    centers = rng.normal(size=(2 if n > 4 else 1, 3)).astype("<f4").tobytes()
+    return bytes(head + section) + partial + centers + rng.integers(0, 60, n * width).astype("u1").tobytes()
+
+
+def _spz_4(unpacked: bytes, n: int, degree: int) -> bytes:
+    """The same splats as version 4, each column a stream of zstd."""
+    widths = [9, 1, 3, 3, 4, 3 * ((degree + 1) ** 2 - 1)]
+    ends = 16 + n * np.cumsum(widths)
+    columns = [unpacked[end - n * width : end] for end, width in zip(ends, widths, strict=True) if width]
+    packed = [ZstdCompressor().compress(column) for column in columns]
+    head = struct.pack("<4sIIBBBBI12x", b"NGSP", 4, n, degree, unpacked[13], 0, len(columns), 32)
+    sizes = [struct.pack("<QQ", len(a), len(b)) for a, b in zip(packed, columns, strict=True)]
+    return head + b"".join(sizes) + b"".join(packed)
+
+
 KINDS: dict[str, Callable[[int], bytes]] = {"ply": ply, "recipe": recipe, "session": session, "npz": npz, "cache": npz}
+KINDS |= {
+    ending: lambda number, ending=ending: _other(ending, number % 24) for ending in ("spz", "sog", "ksplat", "splat")
+}
 """What is read, and what makes it; a cache entry is made from its archive by the check."""

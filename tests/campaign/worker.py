@@ -10,14 +10,15 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.campaign.checks import CHECKS
+from tests.campaign.checks import CHECKS, OTHER_FORMATS
 from tests.campaign.mutations import mutated, mutations_of
 from tests.campaign.seeds import KINDS
 
 MEMORY_BYTES = 4 << 30
 SUFFIXES = {"ply": "ply", "recipe": "json", "session": "splap", "npz": "npz", "cache": "npz"}
+SUFFIXES |= {kind: kind for kind in OTHER_FORMATS}
 # Splat files have most to go wrong.
-SHARES = ("ply", "ply", "ply", "ply", "recipe", "session", "npz", "cache")
+SHARES = ("ply", "ply", "ply", "ply", "recipe", "session", "npz", "cache", *OTHER_FORMATS)
 
 
 def kind_of(number: int) -> str:

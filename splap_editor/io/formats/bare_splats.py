@@ -1,0 +1,89 @@
+"""Splats reduced to what every other format holds: three scales, no filter, finite numbers."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from splap_editor.core.splats.splats import Splats
+
+THIN_LOG_SCALE = float(np.log(1e-6))
+"""Third log-scale given to 2DGS splats on their way to 3DGS programs."""
+
+FAINT, OPAQUE = -14.0, 14.0
+"""Logits of what counts as invisible and as opaque: a millionth from 0 and from 1."""
+
+
+def bare_splats(splats: Splats, largest_degree: int = 3) -> tuple[Splats, int]:
+    """Bring splats to what any 3DGS program understands.
+
+    The 3-D filter of GOF is worked into scales and opacities, 2DGS splats get
+    a third scale of 1e-6, quaternions unit length, higher spherical-harmonic
+    degrees go, thresholds too. Rows keep their order.
+
+    Parameters
+    ----------
+    splats : Splats
+    largest_degree : int
+        Spherical-harmonic degree that the format holds.
+
+    Returns
+    -------
+    bare : Splats
+        float32, three finite log-scales of at least log 1e-6, unit quaternions, finite logits within ±14.
+    n_unusable : int
+        Splats without a usable rotation, scale or opacity: they become invisible.
+    """
+    n = splats.n_splats
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        if splats.filter_radii is None:
+            log_scales = np.array(splats.log_scales, np.float32)
+            logits = np.array(splats.logit_opacities, np.float32)
+        else:
+            log_scales = np.log(splats.scales).astype(np.float32)
+            logits = (np.log(splats.opacities) - np.log1p(-splats.opacities)).astype(np.float32)
+        quats = np.array(splats.quats, np.float32)
+        lengths = np.sqrt(np.einsum("nc,nc->n", quats, quats))
+        usable = np.isfinite(lengths) & (lengths > 0)
+        usable &= ~np.isnan(log_scales).any(axis=1) & (log_scales < np.inf).all(axis=1) & ~np.isnan(logits)
+        quats /= lengths[:, None]
+    if splats.n_scales == 2:
+        log_scales = np.column_stack([log_scales, np.full(n, THIN_LOG_SCALE, np.float32)])
+    log_scales = np.maximum(log_scales, np.float32(THIN_LOG_SCALE))
+    logits = np.clip(logits, FAINT, OPAQUE)
+    unusable = ~usable
+    if unusable.any():
+        quats[unusable] = 1, 0, 0, 0
+        log_scales[unusable] = THIN_LOG_SCALE
+        logits[unusable] = FAINT
+    bare = Splats(
+        means=np.asarray(splats.means, np.float32),
+        log_scales=log_scales,
+        quats=quats,
+        logit_opacities=logits,
+        sh0=_finite(splats.sh0),
+        shN=_finite(splats.shN[:, : (largest_degree + 1) ** 2 - 1]),
+    )
+    return bare, int(unusable.sum())
+
+
+def _finite(values: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Values as float32, zero where they are no numbers."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        cells = np.asarray(values, np.float32)
+    return cells if np.isfinite(cells).all() else np.nan_to_num(cells, nan=0.0, posinf=0.0, neginf=0.0)
+
+
+def alphas_of(logits: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Opacities of logits."""
+    return 1.0 / (1.0 + np.exp(-np.asarray(logits, np.float64)))
+
+
+def logits_of_bytes() -> NDArray[np.float32]:
+    """(256,) logits of opacities stored as bytes; the ends are a quarter of a step off 0 and 1, to be finite."""
+    alphas = np.arange(256) / 255
+    alphas[[0, -1]] = 0.25 / 255, 1 - 0.25 / 255
+    return np.log(alphas / (1 - alphas)).astype(np.float32)
+
+
+def as_bytes(values: NDArray[np.floating]) -> NDArray[np.uint8]:
+    """Numbers rounded to bytes, clipped at 0 and 255."""
+    return np.clip(np.rint(values), 0, 255).astype(np.uint8)

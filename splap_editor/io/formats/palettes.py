@@ -1,0 +1,89 @@
+"""Few values that stand for many: a table of 256 numbers, and a palette of vectors."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from splap_editor.core.progress import Progress
+
+_BINS = 1 << 14
+_ROUNDS = 24
+LARGEST_PALETTE = 1 << 16
+
+
+def codebook(values: NDArray[np.floating]) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+    """Choose 256 numbers that stand for all with little squared error.
+
+    Lloyd's iteration on a histogram, from a start that gives crowded and
+    sparse stretches their share.
+
+    Parameters
+    ----------
+    values : array of float
+        Finite.
+
+    Returns
+    -------
+    numbers : (256,) float32
+        Rising.
+    labels : uint8, shape of ``values``
+        The nearest number of each.
+    """
+    low, high = float(values.min()), float(values.max())
+    if high <= low:
+        return np.full(256, low, np.float32), np.zeros(values.shape, np.uint8)
+    counts, edges = np.histogram(values, _BINS, (low, high))
+    middles = (edges[:-1] + edges[1:]) / 2
+    # The square root of the density lies between equal steps and equal counts.
+    share = np.cumsum(np.sqrt(counts))
+    numbers = np.interp((np.arange(256) + 0.5) / 256 * share[-1], share, middles)
+    for _ in range(_ROUNDS):
+        nearest = np.searchsorted((numbers[1:] + numbers[:-1]) / 2, middles)
+        mass = np.bincount(nearest, counts, 256)
+        centre = np.bincount(nearest, counts * middles, 256)
+        numbers = np.where(mass > 0, centre / np.maximum(mass, 1), numbers)
+    # The ends are met: a splat must not shrink or pale for being the extreme.
+    numbers[0], numbers[-1] = low, high
+    numbers = np.sort(numbers).astype(np.float32)
+    return numbers, np.searchsorted((numbers[1:] + numbers[:-1]) / 2, values).astype(np.uint8)
+
+
+def palette(vectors: NDArray[np.float32], progress: Progress) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    """Choose vectors that stand for all, by halving the groups across their widest direction.
+
+    Parameters
+    ----------
+    vectors : (n, d) float32
+        Finite.
+    progress : Progress
+        Told the share of levels done.
+
+    Returns
+    -------
+    entries : (p, d) float32
+        A power of two of them, at most 65,536 and no more than vectors.
+    labels : (n,) int64
+        The entry of each.
+    """
+    n = len(vectors)
+    n_levels = min(LARGEST_PALETTE.bit_length(), n.bit_length()) - 1
+    order = np.arange(n)
+    # Group g holds places bounds[g] to bounds[g + 1] of the order, and is never empty.
+    bounds = np.array([0, n])
+    for level in range(n_levels):
+        sizes = np.diff(bounds)
+        group = np.repeat(np.arange(len(sizes)), sizes)
+        ordered = vectors[order]
+        means = np.add.reduceat(ordered, bounds[:-1], axis=0, dtype=np.float64) / sizes[:, None]
+        spread = np.add.reduceat(np.square(ordered), bounds[:-1], axis=0, dtype=np.float64) / sizes[:, None] - means**2
+        widest = spread.argmax(axis=1)
+        keys = ordered[np.arange(n), widest[group]]
+        order = order[np.lexsort((keys, group))]
+        # Halves of equal size keep every group alive to the last level.
+        middles = bounds[:-1] + sizes // 2
+        bounds = np.sort(np.concatenate([bounds, middles]))
+        progress((level + 1) / (n_levels + 1))
+    sizes = np.diff(bounds)
+    entries = np.add.reduceat(vectors[order], bounds[:-1], axis=0, dtype=np.float64) / sizes[:, None]
+    labels = np.empty(n, np.int64)
+    labels[order] = np.repeat(np.arange(len(sizes)), sizes)
+    return entries.astype(np.float32), labels

@@ -1,0 +1,159 @@
+"""Splat files of every format: opened by what they hold, saved by what their name ends in."""
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import BinaryIO
+
+from numpy.typing import ArrayLike
+
+from splap_editor.core.progress import Progress, no_progress, part_of
+from splap_editor.core.splats.splats import Splats
+from splap_editor.io.atomic_file import atomic_file
+from splap_editor.io.formats.bare_splats import bare_splats
+from splap_editor.io.formats.losses import losses
+from splap_editor.io.formats.source import FormatError, Source
+from splap_editor.io.formats.table import FORMATS, GLANCE, SplatFormat, format_of, format_to_write
+from splap_editor.io.layout import PlyEvidence
+from splap_editor.io.layouts import LAYOUTS, layout_of
+from splap_editor.io.ply import SplatFile, read_ply, splat_file, write_ply
+
+__all__ = ["FormatError", "SplatFile", "losses_by_format", "losses_of_saving", "read_splats", "write_splats"]
+
+
+def read_splats(
+    path: str | os.PathLike[str], *, layout: str | None = None, progress: Progress = no_progress
+) -> SplatFile:
+    """Read a splat file of any format in `FORMATS`.
+
+    What it is, its bytes say; the name counts for nothing. A PLY is read as
+    `read_ply` does. Of another format the splats are decoded into a table with
+    INRIA's columns, in the file's own order, and saved as a PLY that is the
+    file that comes out.
+
+    Parameters
+    ----------
+    path : path
+    layout : str, optional
+        Name in `splap_editor.io.layouts.LAYOUTS` to use instead of the one recognised.
+    progress : Progress
+        Told the share done; may cancel.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read or holds no usable splats (`PlyError`, `FormatError`); the message is one sentence
+        for the user and what to do.
+    """
+    path = Path(path)
+    source = Source(path)
+    try:
+        row = format_of(path, source.head(GLANCE))
+    except OSError:
+        # Whatever keeps it from being opened, the PLY reader says best.
+        row = FORMATS["ply"]
+    if row.is_ply:
+        return read_ply(path, layout=layout, progress=progress)
+    try:
+        table, warnings = row.read(source, part_of(progress, 0.0, 0.9))
+    except MemoryError:
+        raise FormatError(
+            f"{path.name} does not fit in memory. Close other programs or crop the scene first."
+        ) from None
+    evidence = PlyEvidence(table, path)
+    found = (
+        layout_of(evidence, chosen=layout) if layout else replace(LAYOUTS["3dgs"], reason=f"decoded from {row.title}")
+    )
+    file = splat_file(evidence, found, format_name=row.name)
+    progress(1.0)
+    return replace(file, warnings=warnings + file.warnings)
+
+
+def losses_of_saving(file: SplatFile, row: SplatFormat, splats: Splats | None = None) -> list[str]:
+    """Say what saving a file's splats in a format loses, each as a sentence.
+
+    Parameters
+    ----------
+    file : SplatFile
+    row : SplatFormat
+    splats : Splats, optional
+        The file's splats, deformed.
+    """
+    if row.is_lossless or _is_kept(file, row):
+        return []
+    splats = file.splats if splats is None else splats
+    bare, n_unusable = bare_splats(splats, row.largest_degree)
+    return losses(file, splats, bare, n_unusable, row)
+
+
+def losses_by_format(file: SplatFile) -> dict[str, list[str]]:
+    """What saving a file's splats would lose in each format but PLY, by the format's usual ending."""
+    rows = [row for row in FORMATS.values() if row.can_be_written and not row.is_lossless]
+    return {row.suffixes[0]: losses_of_saving(file, row) for row in rows}
+
+
+def write_splats(
+    path: str | os.PathLike[str],
+    file: SplatFile,
+    splats: Splats,
+    *,
+    as_3dgs: bool = False,
+    extra: Mapping[str, ArrayLike] | None = None,
+    progress: Progress = no_progress,
+) -> None:
+    """Write splats in the format that the path's name ends in; a PLY where it ends in none.
+
+    A PLY is written as `write_ply` does. A file of another format is made anew
+    of the splats; `losses_of_saving` tells before what it cannot hold. The
+    target appears whole or not at all, and may be the file that was read.
+
+    Parameters
+    ----------
+    path, file, splats, as_3dgs, extra, progress
+        As of `write_ply`.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be written, or cannot hold ``extra``.
+    """
+    path = Path(path)
+    row = format_to_write(path)
+    if row.is_lossless or (_is_kept(file, row) and splats is file.splats and not extra):
+        write_ply(path, file, splats, as_3dgs=as_3dgs, extra=extra, progress=progress)
+        return
+    if extra:
+        raise FormatError(f"{path.name} cannot hold the columns {', '.join(extra)}. Save them in a PLY.")
+    bare, _ = bare_splats(splats, row.largest_degree)
+
+    def encoded(out: BinaryIO) -> None:
+        if _is_kept(file, row):
+            from splap_editor.io.formats.compressed import write_in_order
+
+            write_in_order(out, bare, progress)
+        else:
+            row.write(out, bare, progress)
+
+    _write_whole(path, encoded)
+    progress(1.0)
+
+
+def _is_kept(file: SplatFile, row: SplatFormat) -> bool:
+    """Whether a compressed PLY is to be written as the one that it was: its rows keep their order."""
+    return row.is_ply and not row.is_lossless and file.layout.columns is None
+
+
+def _write_whole(path: Path, encoded: Callable[[BinaryIO], None]) -> None:
+    """Write a file whole or not at all, errors as sentences."""
+    try:
+        with atomic_file(path) as out:
+            encoded(out)
+    except FileNotFoundError:
+        folder = Path(os.path.realpath(path)).parent
+        raise FormatError(f"{path} cannot be written: the directory {folder} does not exist. Create it.") from None
+    except OSError as error:
+        raise FormatError(
+            f"{path} cannot be written: {error.strerror or error}. Free some space or choose another place; "
+            "what was there is unchanged."
+        ) from error

@@ -1,0 +1,148 @@
+"""What is no splat file, or a damaged one, is refused in a sentence."""
+
+import dataclasses
+import gzip
+import json
+import struct
+import zipfile
+
+import numpy as np
+import pytest
+
+from splap_editor.engine.recipe_edit import edit_of, require_rows_fit, rows_of
+from splap_editor.io.formats.source import FormatError
+from splap_editor.io.plain_edit import Edit, Handle, Pin
+from splap_editor.io.ply import PlyError
+from splap_editor.io.recipe import RecipeError, recipe_from_json, recipe_to_json
+from splap_editor.io.sample_maker import shape_sample, write_sample
+from splap_editor.io.session_file import content_hash
+from splap_editor.io.splat_files import read_splats, write_splats
+
+
+@pytest.fixture
+def scene(tmp_path):
+    write_sample(tmp_path / "scene.ply", shape_sample("coil", 300).splats)
+    return read_splats(tmp_path / "scene.ply")
+
+
+def spz(n: int, *, version: int = 3, degree: int = 0, bits: int = 12, body: bytes = b"") -> bytes:
+    return gzip.compress(struct.pack("<4sIIBBBB", b"NGSP", version, n, degree, bits, 0, 0) + body)
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (spz(10), "cut short"),
+        (spz(0), "zero splats"),
+        (spz(4_000_000_000), "memory|cannot hold"),
+        (spz(1_000_000), "cannot hold 1,000,000 splats"),
+        (spz(1, version=9), "version 9"),
+        (spz(1, degree=7), "degree 7"),
+        (spz(1, bits=40), "40 of them"),
+        (gzip.compress(b"something else, long enough"), "does not begin as an SPZ"),
+        (spz(10)[:-12], "does not unpack|cut short"),
+        (struct.pack("<4sIIBBBBI", b"NGSP", 4, 10, 0, 12, 0, 5, 32), "cut short"),
+        (struct.pack("<4sIIBBBBI12x", b"NGSP", 4, 10, 0, 12, 0, 2, 32), "2 streams"),
+        (struct.pack("<4sIIBBBBI12x", b"NGSP", 4, 10, 0, 12, 0, 5, 32) + struct.pack("<QQ", 9, 7) * 5, "7 bytes"),
+    ],
+)
+def test_a_damaged_spz_is_refused(tmp_path, data, words):
+    (tmp_path / "bad.spz").write_bytes(data)
+    with pytest.raises(FormatError, match=words):
+        read_splats(tmp_path / "bad.spz")
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda meta: meta.update(version=3), "version 3"),
+        (lambda meta: meta.update(count="many"), "how many splats"),
+        (lambda meta: meta.update(count=10**7), "pixels for 10,000,000 splats"),
+        (lambda meta: meta["means"].update(files=["means_l.webp"]), "where its means are"),
+        (lambda meta: meta["means"].update(mins=[0, None, 0]), "3 numbers as mins"),
+        (lambda meta: meta["scales"].update(codebook=[]), "table of up to 256 values"),
+        (lambda meta: meta["scales"].update(codebook=[float("nan")] * 256), "256 numbers"),
+        (lambda meta: meta["quats"].update(files=["nothing.webp"]), "holds no 'nothing.webp'"),
+        (lambda meta: meta["quats"].update(files=["meta.json"]), "no lossless WebP"),
+    ],
+)
+def test_a_sog_whose_words_do_not_fit_its_pictures_is_refused(tmp_path, scene, change, words):
+    write_splats(tmp_path / "good.sog", scene, scene.splats)
+    with zipfile.ZipFile(tmp_path / "good.sog") as good, zipfile.ZipFile(tmp_path / "bad.sog", "w") as bad:
+        for name in good.namelist():
+            data = good.read(name)
+            if name == "meta.json":
+                meta = json.loads(data)
+                change(meta)
+                data = json.dumps(meta).encode()
+            bad.writestr(name, data)
+    with pytest.raises(FormatError, match=words):
+        read_splats(tmp_path / "bad.sog")
+
+
+def test_a_splat_file_cut_short_is_refused(tmp_path):
+    (tmp_path / "bad.splat").write_bytes(bytes(33))
+    with pytest.raises(FormatError, match="33 bytes and a splat has 32"):
+        read_splats(tmp_path / "bad.splat")
+
+
+def test_a_ksplat_cut_short_or_of_foreign_counts_is_refused(tmp_path):
+    head = bytearray(4096 + 1024)
+    head[1] = 1
+    struct.pack_into("<IIIIH", head, 4, 1, 1, 9, 9, 0)
+    struct.pack_into("<II", head, 4096, 9, 9)
+    for change, words in (((4096, 9, 9), "cut short"), ((4096, 10, 9), "counts of a section")):
+        struct.pack_into("<II", head, *change)
+        (tmp_path / "bad.ksplat").write_bytes(head)
+        with pytest.raises(FormatError, match=words):
+            read_splats(tmp_path / "bad.ksplat")
+
+
+@pytest.mark.parametrize("name", ["nothing.ply", "photo.jpeg", "text"])
+def test_what_is_no_splat_file_is_refused_as_a_ply(tmp_path, name):
+    (tmp_path / name).write_bytes(b"some text that is no splat at all, and long enough to be one")
+    with pytest.raises(PlyError, match="not a PLY file"):
+        read_splats(tmp_path / name)
+
+
+def test_what_cannot_be_opened_is_said(tmp_path):
+    with pytest.raises(PlyError, match="does not exist"):
+        read_splats(tmp_path / "nowhere.spz")
+    with pytest.raises(PlyError, match="directory"):
+        read_splats(tmp_path)
+
+
+def test_formats_that_are_only_read_are_not_written(tmp_path, scene):
+    with pytest.raises(FormatError, match=r"only read. Choose a name with one of \.ply"):
+        write_splats(tmp_path / "out.splat", scene, scene.splats)
+
+
+def test_only_a_ply_takes_columns(tmp_path, scene):
+    with pytest.raises(FormatError, match="cannot hold the columns stretch"):
+        write_splats(tmp_path / "out.spz", scene, scene.splats, extra={"stretch": np.ones(scene.splats.n_splats)})
+
+
+def test_a_position_too_far_for_an_spz_leaves_no_file(tmp_path, scene):
+    far = dataclasses.replace(scene.splats, means=scene.splats.means + np.float32(1e8))
+    with pytest.raises(FormatError, match="positions up to"):
+        write_splats(tmp_path / "out.spz", scene, far)
+    assert not (tmp_path / "out.spz").exists()
+
+
+def test_an_edit_by_rows_fits_a_reordered_file_only_if_it_was_made_for_it(tmp_path, scene):
+    write_splats(tmp_path / "out.sog", scene, scene.splats)
+    write_splats(tmp_path / "out.spz", scene, scene.splats)
+    sog, spz_ = read_splats(tmp_path / "out.sog"), read_splats(tmp_path / "out.spz")
+    by_rows = Edit(handles=(Handle(rows=(1, 2)),))
+    by_place = Edit(handles=(Handle(center=(0, 0, 0), radius=1.0),), pins=(Pin((0, 0, 1), 0.1),))
+    for recipe, file in ((by_place, sog), (by_rows, scene), (by_rows, spz_)):
+        require_rows_fit(recipe, file)
+    with pytest.raises(RecipeError, match=r"rows, and those of out\.sog stand in another order"):
+        require_rows_fit(by_rows, sog)
+    own = dataclasses.replace(by_rows, rows_of=rows_of(sog))
+    assert recipe_from_json(recipe_to_json(own)).rows_of == content_hash(sog.path)
+    require_rows_fit(own, sog)
+    assert edit_of(own, sog.splats).handles[0].region.rows.tolist() == [1, 2]
+    with pytest.raises(RecipeError, match="another order"):
+        require_rows_fit(own, scene)
+    assert rows_of(scene) == ""
