@@ -254,7 +254,8 @@ def test_every_job_can_be_cancelled_and_leaves_everything_as_it_was(kind, main, 
         monkeypatch.setattr(opened.bound.deformer, "solve", solve)
         opened.change_edit(edit.with_poses({handle.handle_id: Pose((0.1, 0.0, 0.0))}), "Move handle")
     else:
-        monkeypatch.setattr(work, "write_ply", lambda *args, progress, **more: waits_until_cancelled(started, progress))
+        waits = lambda *args, progress, **more: waits_until_cancelled(started, progress)  # noqa: E731
+        monkeypatch.setattr(work, "write_splats", waits)
         opened.export(out)
     main.run_until(started.is_set)
     opened.halt()

@@ -8,6 +8,9 @@ from splap_editor.core.splats.splats import Splats
 THIN_LOG_SCALE = float(np.log(1e-6))
 """Third log-scale given to 2DGS splats on their way to 3DGS programs."""
 
+LARGEST_COEFFICIENT = np.float32(1e4)
+"""Of colours: a coefficient of 2 is white already."""
+
 FAINT, OPAQUE = -14.0, 14.0
 """Logits of what counts as invisible and as opaque: a millionth from 0 and from 1."""
 
@@ -66,10 +69,12 @@ def bare_splats(splats: Splats, largest_degree: int = 3) -> tuple[Splats, int]:
 
 
 def _finite(values: NDArray[np.floating]) -> NDArray[np.float32]:
-    """Values as float32, zero where they are no numbers."""
+    """Coefficients as float32, zero where they are no numbers, and none so large that reckoning with it overflows."""
     with np.errstate(over="ignore", invalid="ignore"):
         cells = np.asarray(values, np.float32)
-    return cells if np.isfinite(cells).all() else np.nan_to_num(cells, nan=0.0, posinf=0.0, neginf=0.0)
+    if (np.abs(cells) <= LARGEST_COEFFICIENT).all():
+        return cells
+    return np.clip(np.nan_to_num(cells, nan=0.0, posinf=0.0, neginf=0.0), -LARGEST_COEFFICIENT, LARGEST_COEFFICIENT)
 
 
 def alphas_of(logits: NDArray[np.floating]) -> NDArray[np.float64]:
