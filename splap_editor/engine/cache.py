@@ -19,8 +19,10 @@ from splap_editor.io.regular_file import open_regular
 
 T = TypeVar("T")
 
-_HEAD = struct.Struct("<16sQI")
-_MAGIC = b"SpLap cache 2\r\n\0"
+HEAD = struct.Struct("<16sQI")
+MAGIC = b"SpLap cache 2\r\n\0"
+"""What stands before an entry's archive: the mark of the format, then length and check sum of the archive."""
+
 _CHUNK = 1 << 20
 
 
@@ -94,11 +96,11 @@ class StageCache:
             handle, name = tempfile.mkstemp(dir=self.folder, prefix=".writing-", suffix=".npz")
             try:
                 with os.fdopen(handle, "w+b") as file:
-                    file.write(bytes(_HEAD.size))
+                    file.write(bytes(HEAD.size))
                     # Newer numpy has a parameter among the names of arrays, which none of ours is.
                     named: dict[str, Any] = arrays
                     np.savez(file, **named)
-                    head = _HEAD.pack(_MAGIC, *_length_and_sum(file))
+                    head = HEAD.pack(MAGIC, *_length_and_sum(file))
                     file.seek(0)
                     file.write(head)
                 os.replace(name, path)
@@ -155,10 +157,10 @@ class _EarlierFormatError(CacheEntryError):
 
 def _checked_arrays(file: BinaryIO) -> Arrays:
     """Arrays of an entry whose bytes are those that were written."""
-    head = file.read(_HEAD.size)
+    head = file.read(HEAD.size)
     if head[:4] == b"PK\3\4":
         raise _EarlierFormatError
-    if len(head) < _HEAD.size or head != _HEAD.pack(_MAGIC, *(found := _length_and_sum(file))):
+    if len(head) < HEAD.size or head != HEAD.pack(MAGIC, *(found := _length_and_sum(file))):
         raise CacheEntryError("its check sum is wrong")
     archive = NpzFile(file, most_bytes=found[0])
     return {name: archive.array(name) for name in archive.names}
@@ -166,7 +168,7 @@ def _checked_arrays(file: BinaryIO) -> Arrays:
 
 def _length_and_sum(file: BinaryIO) -> tuple[int, int]:
     """Number of bytes after the head, and their check sum."""
-    file.seek(_HEAD.size)
+    file.seek(HEAD.size)
     n_bytes = total = 0
     while chunk := file.read(_CHUNK):
         n_bytes += len(chunk)

@@ -12,7 +12,7 @@ from splap_editor.core.deformer import UnconstrainedComponentError
 from splap_editor.core.handle_nodes import Region
 from splap_editor.core.pose import Pose
 from splap_editor.engine.bound_edit import bind
-from splap_editor.engine.cache import _HEAD, _MAGIC, StageCache
+from splap_editor.engine.cache import HEAD, MAGIC, StageCache
 from splap_editor.engine.edit import Edit, Handle
 from splap_editor.engine.scene_info import scene_info
 from splap_editor.engine.surface import surface_of
@@ -28,6 +28,11 @@ SHIFT = np.array([1.0, 2.0, -1.0])
 """Whole, for columns of whole numbers."""
 
 
+def is_deformed(number: int) -> bool:
+    """Whether the input of a number is deformed too: one in 40, which is a splat file, of any layout."""
+    return number % 40 == 0
+
+
 def check_ply(path: Path, number: int) -> bool:
     """Whether a splat file is accepted; then it goes out as it came in, and comes back after an edit."""
     try:
@@ -40,7 +45,7 @@ def check_ply(path: Path, number: int) -> bool:
     assert out.read_bytes() == path.read_bytes(), "an unedited file is not what it was"
     _check_edited(out, file)
     scene_info(file)
-    if number % 40 == 0:
+    if is_deformed(number):
         _check_deformed(out, file)
     return True
 
@@ -142,7 +147,7 @@ def check_cache(path: Path, number: int) -> bool:
     data = path.read_bytes()
     cache = StageCache(path.with_name("cache"))
     cache.folder.mkdir(exist_ok=True)
-    head = _HEAD.pack(_MAGIC, len(data), zlib.crc32(data)) if number % 2 else data[: _HEAD.size]
+    head = HEAD.pack(MAGIC, len(data), zlib.crc32(data)) if number % 2 else data[: HEAD.size]
     (cache.folder / "key.npz").write_bytes(head + data)
     try:
         found = cache.load("key", dict)

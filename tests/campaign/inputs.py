@@ -8,6 +8,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from time import monotonic
 
+from tests.campaign.checks import is_deformed
 from tests.campaign.worker import input_of, kind_of
 
 SECONDS = 5.0
@@ -33,7 +34,7 @@ class Worker:
         self._process.stdin.write(",".join(map(str, (number, *left_out))) + "\n")
         self._process.stdin.flush()
         # The first deformation of a process waits for its loops.
-        answer = self._answer(SECONDS if number % 40 else START_SECONDS)
+        answer = self._answer(START_SECONDS if is_deformed(number) else SECONDS)
         if answer is not None and answer:
             return ast.literal_eval(answer)
         found = "hang" if answer is None else f"crash {self._process.wait()}"
