@@ -6,6 +6,7 @@ import sys
 import traceback
 from collections.abc import Callable
 from pathlib import Path
+from types import TracebackType
 
 os.environ.setdefault("QT_API", "pyside6")
 
@@ -71,7 +72,8 @@ def run(path: Path | None = None, *, tell: Callable[[float], None] = no_progress
     """
     ask_of_qt()
     _tell_taskbar()
-    app = QApplication.instance() or QApplication([APP_ID])
+    running = QApplication.instance()
+    app = running if isinstance(running, QApplication) else QApplication([APP_ID])
     app.setDesktopFileName(APP_ID)
     QCoreApplication.setOrganizationName(APP_ID)
     QCoreApplication.setApplicationName("SpLap Editor")
@@ -114,7 +116,9 @@ def make_window(cache: StageCache | None = None) -> MainWindow:
     scale = widget.devicePixelRatioF()
     pacer = FramePacer(session, widget.update, lambda: widget.isVisible() and not widget.window().isMinimized())
     widget.frame_drawn.connect(lambda milliseconds: mailbox.post(pacer.drawn))
-    viewport = Viewport(widget.render_window, pacer, renderer=widget.renderer, scale=scale)
+    render_window = widget.render_window
+    assert render_window is not None  # there is one until the widget is closed
+    viewport = Viewport(render_window, pacer, renderer=widget.renderer, scale=scale)
     view = SceneView(session, viewport)
     documents = Documents(session, mailbox.post)
     autosave = Autosave(documents, mailbox.post)
@@ -138,8 +142,8 @@ def open_first(window: MainWindow, path: Path, tell: Callable[[float], None] = n
     return first
 
 
-def _shows_in(window: MainWindow):
-    def hook(kind: type[BaseException], error: BaseException, trace: object) -> None:
+def _shows_in(window: MainWindow) -> Callable[[type[BaseException], BaseException, TracebackType | None], None]:
+    def hook(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
         traceback.print_exception(kind, error, trace)
         if not issubclass(kind, KeyboardInterrupt):
             window.toast.fail(f"Something went wrong here: {error}. The edit is kept; undo if the picture looks odd.")

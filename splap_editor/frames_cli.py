@@ -14,6 +14,10 @@ from splap_editor.io.session_specs import SessionFile
 from splap_editor.stage_report import StageReport
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
     from splap_editor.engine.edit import Edit
     from splap_editor.engine.frames import FramePoser
     from splap_editor.io.ply import SplatFile
@@ -76,9 +80,11 @@ def render(options: argparse.Namespace) -> int:
     report = StageReport(quiet=options.quiet or options.json)
     held = read_edit_file(options)
     timeline = held.timeline if isinstance(held, SessionFile) else None
-    if options.frames is not None and timeline is None:
-        raise ValueError("--frames needs keyframes: give a session saved by the editor with --session")
-    frames = frame_range(options.frames, timeline.n_frames) if options.frames is not None else None
+    frames = None
+    if options.frames is not None:
+        if timeline is None:
+            raise ValueError("--frames needs keyframes: give a session saved by the editor with --session")
+        frames = frame_range(options.frames, timeline.n_frames)
     file, poser = _prepared(options, held, report)
     output = options.output
     if output.is_dir() or output.suffix.lower() != ".png":
@@ -88,7 +94,7 @@ def render(options: argparse.Namespace) -> int:
         studio, view = _studio(options, held, file)
     try:
 
-        def draw(kernels: object) -> object:
+        def draw(kernels: "AdaptedKernels | None") -> "NDArray[np.uint8]":
             studio.pose(kernels)
             return studio.picture(view, is_transparent=options.transparent)
 
@@ -146,21 +152,21 @@ def _studio(
     # Without a display VTK warns before it draws by other means.
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
     session = held if isinstance(held, SessionFile) else None
-    display = dict(session.display) if session is not None else {}
+    display: dict[str, object] = dict(session.display) if session is not None else {}
     if options.mode is not None and options.mode != display.get("mode"):
         # Size and cut belong to the mode they were set in.
         display = {"background": display.get("background"), "mode": options.mode}
     width, height = options.size
-    has_hidden = session is not None and session.ply.n_splats == file.splats.n_splats
-    hidden = session.hidden if has_hidden else None
+    is_of_file = session is not None and session.ply.n_splats == file.splats.n_splats
+    hidden = session.hidden if session is not None and is_of_file else None
     studio = Studio(file.splats, look_named(display), width, height, hidden=hidden)
     studio.viewport.set_background(*background_named(display))
     if session is None or session.view is None:
         return studio, studio.home()
     spec = session.view
     studio.viewport.camera.world_up = np.array(spec.world_up)
-    vectors = (np.array(v, np.float64) for v in (spec.position, spec.focal_point, spec.view_up))
-    return studio, View(*vectors, spec.angle, spec.is_parallel)
+    eye, focus, up = (np.array(v, np.float64) for v in (spec.position, spec.focal_point, spec.view_up))
+    return studio, View(eye, focus, up, spec.angle, spec.is_parallel)
 
 
 def _drawn_round(

@@ -4,6 +4,8 @@ import sys
 from time import perf_counter
 from types import TracebackType
 
+from splap_editor.core.progress import Progress
+
 
 class StageReport:
     """Prints ``stage  42 %`` on a terminal while a stage runs, and ``stage  1.3 s`` when it ends.
@@ -34,7 +36,7 @@ class StageReport:
         elif self._live:
             print(file=sys.stderr)
 
-    def stage(self, stage: str):
+    def stage(self, stage: str) -> Progress:
         """Begin a stage, ending the one before; gives its progress callback."""
         if stage != self._stage:
             self.end_stage()

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numba
 from numba import types
@@ -165,7 +165,7 @@ class Compilation:
         for thread in self._threads:
             thread.join()
 
-    def _serve(self, process: subprocess.Popen) -> None:
+    def _serve(self, process: subprocess.Popen[str]) -> None:
         try:
             while True:
                 with self._lock:
@@ -181,20 +181,27 @@ class Compilation:
                     self._told()
         finally:
             # One that has ended leaves words in the pipe that nobody will read.
+            words, answers = _pipes(process)
             with contextlib.suppress(OSError):
-                process.stdin.close()
-            process.stdout.close()
+                words.close()
+            answers.close()
             process.wait()
 
 
-def _answer(process: subprocess.Popen, index: int) -> str:
+def _answer(process: subprocess.Popen[str], index: int) -> str:
     """What a process says to a loop; nothing if it has ended."""
+    words, answers = _pipes(process)
     try:
-        process.stdin.write(f"{index}\n")
-        process.stdin.flush()
-        return process.stdout.readline().strip()
+        words.write(f"{index}\n")
+        words.flush()
+        return answers.readline().strip()
     except (OSError, ValueError):
         return ""
+
+
+def _pipes(process: subprocess.Popen[str]) -> tuple[IO[str], IO[str]]:
+    assert process.stdin is not None and process.stdout is not None
+    return process.stdin, process.stdout
 
 
 def _grouped(wanted: Iterable[Loop]) -> list[list[Loop]]:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from importlib import import_module
 from numbers import Integral, Real
-from typing import Any, TypeVar
+from typing import Any, TypeVar, overload
 
 Group = TypeVar("Group")
 
@@ -27,6 +27,12 @@ Length = float | ShareOfSize | None
 """World units, a share of the scene's size, or None for no bound."""
 
 
+@overload
+def world_length(length: float | ShareOfSize, size: float) -> float: ...
+@overload
+def world_length(length: None, size: float) -> None: ...
+@overload
+def world_length(length: Length, size: float) -> float | None: ...
 def world_length(length: Length, size: float) -> float | None:
     """Length in world units, in a scene of size s; None stays None."""
     return length.share * size if isinstance(length, ShareOfSize) else length

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels, adapted_splats
 from splap_editor.core.progress import Progress, Runner, in_turn, no_progress, part_of
@@ -13,6 +14,8 @@ from splap_editor.engine.edit import Edit
 from splap_editor.engine.keyframes import edit_at_frame
 from splap_editor.engine.surface import Surface
 from splap_editor.io.splat_files import SplatFile, write_splats
+
+Pixels = TypeVar("Pixels")
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,8 +122,8 @@ def write_pictures(
     poser: FramePoser,
     frames: range,
     path: Path,
-    draw: Callable[[AdaptedKernels | None], object],
-    write: Callable[[Path, object], None],
+    draw: Callable[[AdaptedKernels | None], Pixels],
+    write: Callable[[Path, Pixels], None],
     *,
     progress: Progress = no_progress,
 ) -> list[Path]:

@@ -7,6 +7,7 @@ importing. It prints one JSON object, ``{"renderer": …, "version": …}`` or `
 import ctypes
 import json
 import sys
+from collections.abc import Callable
 from ctypes import CDLL, CFUNCTYPE, POINTER, byref, c_char_p, c_int, c_uint, c_ulong, c_void_p
 
 WANTED = (3, 2)
@@ -70,7 +71,7 @@ def _attributes(*pairs: int, end: int = 0) -> ctypes.Array:
     return (c_int * (len(pairs) + 1))(*pairs, end)
 
 
-def _strings(get_string) -> dict[str, str]:
+def _strings(get_string: Callable[[c_uint], bytes | None]) -> dict[str, str]:
     answers = {name: get_string(c_uint(number)) for name, number in _STRINGS.items()}
     return {name: answer.decode(errors="replace") for name, answer in answers.items() if answer}
 

@@ -68,7 +68,7 @@ class WindowCheck:
         NotReadyError
             The display does not answer, or has no OpenGL 3.2.
         """
-        if self._probe is None:
+        if self._probe is None or self.platform is None:
             return
         answer = probed(self._probe)
         reason = answer.get("refused")
@@ -79,14 +79,15 @@ class WindowCheck:
                 f"xhost +si:localuser:{getuser()}"
             )
         if reason is not None:
-            raise NotReadyError(self._opengl_sentence())
+            raise NotReadyError(_opengl_sentence(self.platform))
 
-    def _opengl_sentence(self) -> str:
-        version = ".".join(map(str, opengl_probe.WANTED))
-        lacks = f"the window needs OpenGL {version}, which this display does not offer"
-        if "refused" not in probed(_started_probe(self.platform, _SOFTWARE)):
-            return f"{lacks}; update the graphics driver, or draw without it: LIBGL_ALWAYS_SOFTWARE=1 splap-editor"
-        return f"{lacks}; {_install([need for need in needs() if need.use == 'driver'], 'install a driver')}"
+
+def _opengl_sentence(platform: str) -> str:
+    version = ".".join(map(str, opengl_probe.WANTED))
+    lacks = f"the window needs OpenGL {version}, which this display does not offer"
+    if "refused" not in probed(_started_probe(platform, _SOFTWARE)):
+        return f"{lacks}; update the graphics driver, or draw without it: LIBGL_ALWAYS_SOFTWARE=1 splap-editor"
+    return f"{lacks}; {_install([need for need in needs() if need.use == 'driver'], 'install a driver')}"
 
 
 def opengl(where: str) -> dict[str, str]:

@@ -57,6 +57,13 @@ class Scene:
         return self.file.splats
 
     @property
+    def prepared(self) -> Surface:
+        """The surface, for what is offered only once there is one; RuntimeError before."""
+        if self.surface is None:
+            raise RuntimeError("the scene is not prepared yet")
+        return self.surface
+
+    @property
     def shown_edit(self) -> Edit:
         """The edit on screen: a drag's preview while there is one."""
         return self.preview if self.preview is not None else self.edit

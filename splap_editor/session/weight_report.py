@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.bbw.bbw import BbwDeformer, BbwReport
+from splap_editor.core.bbw.bbw import BbwReport, WeightedDeformer
 from splap_editor.engine.edit import Edit
 from splap_editor.engine.surface import Surface
 
@@ -14,13 +14,13 @@ KKT_WARNING = 1e-3
 """Steps of a weight left to go that a person would see."""
 
 
-def splat_weights(surface: Surface, deformer: BbwDeformer, column: int) -> NDArray[np.float64]:
+def splat_weights(surface: Surface, deformer: WeightedDeformer, column: int) -> NDArray[np.float64]:
     """Weight of one handle at every splat of the file.
 
     Parameters
     ----------
     surface : Surface
-    deformer : BbwDeformer
+    deformer : WeightedDeformer
     column : int
         Handle, in the order in which they were bound.
 

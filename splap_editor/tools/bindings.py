@@ -3,7 +3,13 @@
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+
+if TYPE_CHECKING:
+    from splap_editor.tools.tool import Stroke
+
+Used: TypeAlias = "Stroke | bool | None"
+"""What an act gives: whether the event was used, or the drag that it began."""
 
 MODIFIERS = ("Shift", "Ctrl", "Alt")
 _QT_NAMES = {"[": "BracketLeft", "]": "BracketRight", "Esc": "Escape"}
@@ -63,7 +69,7 @@ class Binding:
     """
 
     chords: tuple[str, ...]
-    act: Callable[[Any, Any], object]
+    act: Callable[[Any, Any], Used]
     sentence: str = ""
     brief: str = ""
     on: str = ""

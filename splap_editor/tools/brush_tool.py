@@ -41,6 +41,8 @@ class BrushOptions:
 class BrushStroke(DrawnStroke):
     """Everything within the radius of where the pointer went, seen as it is painted."""
 
+    tool: "BrushTool"
+
     def __init__(self, tool: "BrushTool", press: PointerEvent, mode: SelectionMode) -> None:
         super().__init__(tool, press, mode)
         self._screen = self.context.viewport.screen_points()
@@ -62,7 +64,7 @@ class BrushStroke(DrawnStroke):
 
     def end(self, event: PointerEvent) -> None:
         """Select what was painted."""
-        self.context.session.scene.set_selection(self.before)
+        self.context.session.shown_scene.set_selection(self.before)
         super().end(event)
 
     def cancel(self) -> None:
@@ -77,7 +79,7 @@ class BrushStroke(DrawnStroke):
         picked = self.inside(self._screen)
         if not self.tool.is_through:
             picked = self.context.viewport.visible_only(self._screen, picked)
-        self.context.session.scene.set_selection(combined_selection(self.before, picked, self.mode))
+        self.context.session.shown_scene.set_selection(combined_selection(self.before, picked, self.mode))
         end = perf_counter()
         self._busy_until = end + (end - start)
 

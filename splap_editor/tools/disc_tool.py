@@ -9,7 +9,7 @@ from splap_editor.core.options import option
 from splap_editor.core.pose import Pose
 from splap_editor.session.placement import disc_rows, held_pose, rows_region
 from splap_editor.tools.bindings import Binding
-from splap_editor.tools.tool import KeyEvent, PointerEvent, Tool, ToolContext
+from splap_editor.tools.tool import Held, KeyEvent, PointerEvent, Tool, ToolContext
 
 REACH_STEP = 1.15
 REACH_RANGE = (0.002, 0.5)
@@ -43,13 +43,13 @@ class DiscTool(Tool):
     def __init__(self, context: ToolContext) -> None:
         super().__init__(context)
         self._hovered: tuple[int, float] = (-1, 0.0)
-        self._reach = context.held(self.option_kinds[0])
+        self._reach: Held[DiscOptions] = context.held(self.option_kinds[0])
         self._reach.changed.connect(self._show)
 
     @property
     def radius_world(self) -> float:
         """Radius of the disc in world units."""
-        return self._reach.value.reach * self.context.session.scene.ellipses.scene_scale
+        return self._reach.value.reach * self.context.session.shown_scene.ellipses.scene_scale
 
     def hover(self, event: PointerEvent) -> bool:
         """Show the disc."""
@@ -68,7 +68,7 @@ class DiscTool(Tool):
 
     def place(self, event: PointerEvent) -> None:
         """Make the disc under the pointer what the tool makes."""
-        hit, scene = self.context.viewport.pick(*event.xy), self.context.session.scene
+        hit, scene = self.context.viewport.pick(*event.xy), self.context.session.shown_scene
         if hit is not None:
             region = rows_region(scene, disc_rows(scene, hit.row, self.radius_world))
             self.left()
@@ -95,8 +95,9 @@ class DiscTool(Tool):
     def _light(self, hovered: tuple[int, float]) -> None:
         if hovered != self._hovered:
             self._hovered = hovered
-            scene, row = self.context.session.scene, hovered[0]
-            self.context.viewport.show_disc(None if row < 0 else disc_rows(scene, row, self.radius_world))
+            session, row = self.context.session, hovered[0]
+            disc = None if row < 0 else disc_rows(session.shown_scene, row, self.radius_world)
+            self.context.viewport.show_disc(disc)
 
 
 RESIZE = Binding(("Ctrl+Wheel", "[", "]"), DiscTool.resize, "Reach of the next one", "reach")

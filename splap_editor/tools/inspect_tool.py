@@ -26,7 +26,7 @@ class InspectTool(Tool):
 
     def inspect(self, event: PointerEvent) -> None:
         """Look at what is under the pointer."""
-        viewport, positions = self.context.viewport, self.context.session.scene.positions
+        viewport, positions = self.context.viewport, self.context.session.shown_scene.positions
         projection, hit = viewport.projection, viewport.pick(*event.xy)
         # The lines to neighbours are drawn over everything, other edges may be hidden by the surface.
         lines = self.inspected.neighbor_edges()
@@ -34,7 +34,8 @@ class InspectTool(Tool):
         if found is None:
             lines = self.inspected.more_edges()
             depth = float(projection.depths(hit.point)[0]) if hit is not None else np.inf
-            extent = viewport.splats.shown.extent
+            shown = viewport.splats.shown
+            extent = shown.extent if shown is not None else 0.0
             found = edge_under(projection, positions, lines, event.xy, EDGE_REACH_PX, depth=depth, extent=extent)
         if found is not None:
             a, b = lines[found].tolist()

@@ -35,7 +35,7 @@ class PinStroke:
         row = None if hit is None else hit.row
         if row != self._row:
             self._row = row
-            scene = self._context.session.scene
+            scene = self._context.session.shown_scene
             self._context.viewport.show_disc(None if row is None else disc_rows(scene, row, self._pin.reach))
 
     def end(self, event: PointerEvent) -> None:
@@ -43,8 +43,8 @@ class PinStroke:
         self._context.viewport.show_disc(None)
         session = self._context.session
         if self._row is not None:
-            pin = moved_pin(session.scene, self._pin, self._row)
-            session.change_edit(session.scene.edit.with_pin(pin), "Move pin")
+            pin = moved_pin(session.shown_scene, self._pin, self._row)
+            session.change_edit(session.shown_scene.edit.with_pin(pin), "Move pin")
 
     def cancel(self) -> None:
         """Leave the pin where it was."""

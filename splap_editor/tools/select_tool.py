@@ -3,13 +3,14 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.options import option
 from splap_editor.session.selection import SelectionMode, combined_selection
-from splap_editor.tools.bindings import Binding
+from splap_editor.tools.bindings import Binding, Used
 from splap_editor.tools.tool import PointerEvent, Tool, ToolContext
 
 MODES = (
@@ -41,7 +42,7 @@ class DrawnStroke:
         self.tool = tool
         self.context = tool.context
         self.mode = mode
-        self.before = self.context.session.scene.selection
+        self.before = self.context.session.shown_scene.selection
         self.path = [press.xy]
 
     def move(self, event: PointerEvent) -> None:
@@ -69,7 +70,7 @@ class DrawnStroke:
 class SelectTool(Tool):
     """A click picks the splat under it; beside the object with no modifier it clears the selection."""
 
-    option_kinds = (SelectOptions,)
+    option_kinds: ClassVar[tuple[type, ...]] = (SelectOptions,)
 
     def __init__(self, context: ToolContext) -> None:
         super().__init__(context)
@@ -82,7 +83,7 @@ class SelectTool(Tool):
 
     def pick(self, event: PointerEvent, mode: SelectionMode) -> None:
         """Select the splat under the pointer."""
-        picked = np.zeros_like(self.context.session.scene.selection)
+        picked = np.zeros_like(self.context.session.shown_scene.selection)
         hit = self.context.viewport.pick(*event.xy)
         if hit is not None:
             picked[hit.row] = True
@@ -91,11 +92,11 @@ class SelectTool(Tool):
     def select(self, picked: NDArray[np.bool_], mode: SelectionMode) -> None:
         """Let picked splats meet those selected: one step of the history."""
         session = self.context.session
-        session.change_mask("selection", combined_selection(session.scene.selection, picked, mode), "Select")
+        session.change_mask("selection", combined_selection(session.shown_scene.selection, picked, mode), "Select")
 
 
 def picking(
-    act: Callable[..., object], sentence: str, brief: str = "", *, gesture: str = "Drag", at_once: bool = False
+    act: Callable[..., Used], sentence: str, brief: str = "", *, gesture: str = "Drag", at_once: bool = False
 ) -> tuple[Binding, ...]:
     """Rows for a gesture with each of the modifiers; ``act(tool, event, mode)``."""
     return tuple(

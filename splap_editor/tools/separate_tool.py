@@ -78,7 +78,7 @@ class SeparateTool(Tool):
 
     def take_part(self, path: list[tuple[float, float]]) -> None:
         """Take the splats under some pixels as the next part; after two, begin anew."""
-        scene, viewport = self.context.session.scene, self.context.viewport
+        scene, viewport = self.context.session.shown_scene, self.context.viewport
         hits = [hit for hit in (viewport.pick(*xy) for xy in path) if hit is not None]
         rows = tuple(dict.fromkeys(hit.row for hit in hits))
         if not rows:
@@ -146,7 +146,8 @@ class SeparateTool(Tool):
         scene = self.context.session.scene
         if len(self.parts) < 2 or scene is None or scene.surface is None:
             return
-        stroke, surface = Separation(*self.parts, self.wider), scene.surface
+        first, second = self.parts
+        stroke, surface = Separation(first, second, self.wider), scene.surface
 
         def make(job: Job) -> FoundSeam:
             return found_seam(surface, stroke)

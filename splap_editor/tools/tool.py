@@ -252,7 +252,8 @@ class Tool:
         name, held = gesture_name(press.button, "Drag"), held_modifiers(press)
         is_orbit = self.yields_to_orbit and self.context.left_orbits and not (press.shift or press.ctrl)
         for binding in () if is_orbit else answering(self.bindings, name, held):
-            return binding.act(self, press)
+            begun = binding.act(self, press)
+            return None if isinstance(begun, bool) else begun
         return None
 
     def _perform(self, names: tuple[str, ...], event: PointerEvent | KeyEvent) -> bool:
@@ -284,7 +285,7 @@ class Tool:
                 continue
             used = binding.act(self, event)
             if used is not None and used is not False:
-                self._stroke, self._button = None if used is True else used, event.button
+                self._stroke, self._button = None if isinstance(used, bool) else used, event.button
                 return True
         if waits:
             self._waiting, self._button = [event], event.button
@@ -301,8 +302,9 @@ class Tool:
             self.left()
             self._stroke = self.stroke(press) or self.context.orbit(press)
             # Where the pointer went before it was known to be a drag is part of it.
-            for move in moves if self._stroke is not None else ():
-                self._stroke.move(move)
+            if self._stroke is not None:
+                for move in moves:
+                    self._stroke.move(move)
 
     def _release(self, event: PointerEvent) -> bool:
         if event.button != self._button:

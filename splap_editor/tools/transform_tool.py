@@ -11,7 +11,7 @@ from splap_editor.session.pivot import Pivot
 from splap_editor.tools.bindings import Binding
 from splap_editor.tools.pin_stroke import PinStroke
 from splap_editor.tools.tool import KeyEvent, PointerEvent, Tool, ToolContext
-from splap_editor.viewport.gizmo import DOT, SCALE_BOX, VIEW_RING, Act, Lock, Part
+from splap_editor.viewport.gizmo_parts import DOT, SCALE_BOX, VIEW_RING, Act, Lock, Part
 
 MARKER_REACH_PX = 11.0
 
@@ -132,7 +132,7 @@ class TransformTool(Tool):
     def _lock(self, lock: Lock, axis: int) -> None:
         gizmo = self.context.viewport.gizmo
         part = gizmo.dragged
-        if part.act is Act.SCALE:
+        if part is None or part.act is Act.SCALE:
             return  # handles scale alike along all axes
         if part.act is Act.ROTATE:
             lock = Lock.AXIS
@@ -163,6 +163,7 @@ class TransformTool(Tool):
     def _read_out(self) -> str:
         gizmo = self.context.viewport.gizmo
         part = gizmo.dragged
+        assert part is not None
         bound = {Lock.AXIS: f" along {'XYZ'[part.axis]}", Lock.PLANE: f" across {'XYZ'[part.axis]}", Lock.VIEW: ""}
         typed = f"  [{self._typed}]" if self._typed else ""
         if part.act is Act.ROTATE:
@@ -175,7 +176,9 @@ class TransformTool(Tool):
     def _commit(self) -> None:
         viewport = self.context.viewport
         self.context.session.catch_up()
-        label = _LABELS[viewport.gizmo.dragged.act]
+        part = viewport.gizmo.dragged
+        assert part is not None
+        label = _LABELS[part.act]
         if len(self._starts) > 1:
             label += "s"
         has_moved = self._has_moved
@@ -194,7 +197,7 @@ class TransformTool(Tool):
 
     def choose(self, event: PointerEvent) -> bool | PinStroke:
         """Choose the handle or pin whose mark is under the cursor; a pin goes along with the pointer."""
-        found, scene = self._marked(event.xy), self.context.session.scene
+        found, scene = self._marked(event.xy), self.context.session.shown_scene
         if isinstance(found, Pin):
             scene.set_active_handles((), (found.pin_id,))
             return PinStroke(self.context, found, event)
@@ -204,7 +207,7 @@ class TransformTool(Tool):
 
     def choose_more(self, event: PointerEvent) -> bool:
         """Choose one more handle or pin, or one less."""
-        found, scene = self._marked(event.xy), self.context.session.scene
+        found, scene = self._marked(event.xy), self.context.session.shown_scene
         handles, pins = scene.active_handles, scene.active_pins
         if isinstance(found, Pin):
             scene.set_active_handles(handles, toggled(pins, found.pin_id))
@@ -216,13 +219,13 @@ class TransformTool(Tool):
         """Put the point that handles turn about where the pointer is on the surface."""
         hit = self.context.viewport.pick(*event.xy)
         if hit is not None:
-            self.context.session.scene.set_pivot(Pivot.POINT, hit.point)
+            self.context.session.shown_scene.set_pivot(Pivot.POINT, hit.point)
         return hit is not None
 
     def _marked(self, xy: tuple[float, float]) -> Handle | Pin | None:
         """The handle or pin whose mark is near a pixel; of two as near the one drawn on top."""
-        viewport, edit = self.context.viewport, self.context.session.scene.edit
-        marked = (*edit.active_handles, *edit.pins)
+        viewport, edit = self.context.viewport, self.context.session.shown_scene.edit
+        marked: tuple[Handle | Pin, ...] = (*edit.active_handles, *edit.pins)
         if not marked:
             return None
         centers = np.array([each.moved_center if isinstance(each, Handle) else each.region.center for each in marked])

@@ -1,6 +1,6 @@
 """How the scene is shown: one value that panel, menu and keys change and the viewport follows."""
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -61,7 +61,7 @@ class Display:
     def __init__(self) -> None:
         self.changed = Signal()
         settings, default = QSettings(), DisplayOptions()
-        kept = {}
+        kept: dict[str, Any] = {}
         for name in KEPT:
             held = getattr(default, name)
             kept[name] = settings.value(f"display/{name}", held, type=type(held))
@@ -90,7 +90,12 @@ class Display:
     def restore(self, held: Mapping[str, Any]) -> None:
         """Take options from a session file; what is unknown, of another kind or out of bounds is left as it is."""
         shown = [compare.value for compare in Compare]
-        choices = {"mode": MODES, "background": BACKGROUNDS, "fixed": FIXED_TINTS, "shown": shown}
+        choices: dict[str, Container[str]] = {
+            "mode": MODES,
+            "background": BACKGROUNDS,
+            "fixed": FIXED_TINTS,
+            "shown": shown,
+        }
         values = {}
         for name, usual in vars(DisplayOptions()).items():
             value = held.get(name)

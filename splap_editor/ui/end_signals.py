@@ -25,7 +25,7 @@ class EndSignals(QObject):
 
     def __init__(self, end: Callable[[int], None], parent: QObject) -> None:
         super().__init__(parent)
-        self._end = end
+        self._end: Callable[[int], None] | None = end
         self._reader, self._writer = socket.socketpair()
         for end_of_pair in (self._reader, self._writer):
             end_of_pair.setblocking(False)

@@ -4,9 +4,15 @@ from pathlib import Path
 
 from PySide6.QtGui import QDragEnterEvent, QDragLeaveEvent, QDropEvent
 
+from splap_editor.ui.actions.file_actions import FileActions
+from splap_editor.ui.widgets.overlay import Overlay
+
 
 class FileDrop:
     """The part of a window that takes files: it has an ``overlay`` to say so, and ``files`` that open them."""
+
+    overlay: Overlay
+    files: FileActions
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         """Frame the picture when the file is one that opens."""

@@ -9,6 +9,7 @@ from splap_editor.session.graph_preview import GraphPreview
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.session.signals import Signal
+from splap_editor.tools.inspect_tool import InspectTool
 from splap_editor.tools.probe_tool import ProbeTool
 from splap_editor.tools.tool import ToolContext
 from splap_editor.tools.tool_manager import ToolManager
@@ -63,6 +64,7 @@ class Inspection:
         self._tools = tools
         self._fly_to = fly_to
         tool = tools.tools["inspect"]
+        assert isinstance(tool, InspectTool)
         self.quantities = QuantityView(session, view)
         self.inspected: InspectView = context.inspected
         self.graph_view = GraphView(session, view)
@@ -119,7 +121,7 @@ class Inspection:
             bring_into_view(self.inspect_panel)
 
     def _on_picked(self) -> None:
-        if self.inspected.is_on and self._session.scene.picked is not None:
+        if self.inspected.is_on and self._session.shown_scene.picked is not None:
             bring_into_view(self.inspect_panel)
 
     def _show_value(self) -> None:

@@ -297,7 +297,7 @@ class MainWindow(FileDrop, QMainWindow):
         self.display.apply(self.view)
 
     def _show_pivot(self) -> None:
-        self.actions_.check(f"handle.pivot_{self.session.scene.pivot.value}")
+        self.actions_.check(f"handle.pivot_{self.session.shown_scene.pivot.value}")
 
     def _on_scene_changed(self) -> None:
         self._show_pivot()
@@ -317,7 +317,7 @@ class MainWindow(FileDrop, QMainWindow):
             self.overlay.show_hint("Drop a splat PLY here, or press Ctrl+O.")
 
     def _on_edit_changed(self) -> None:
-        edit = self.session.scene.edit
+        edit = self.session.shown_scene.edit
         if edit.handles and self.overlay.hint == HINT:
             self.overlay.show_hint(HINT[1])
         if edit.handles and not edit.is_identity:
@@ -343,8 +343,8 @@ class MainWindow(FileDrop, QMainWindow):
 
     def event(self, event: QEvent) -> bool:
         """Let tools have a key that no text field wants, wherever the focus is."""
-        is_key = event.type() == QEvent.Type.ShortcutOverride and not self.viewport.hasFocus()
-        if is_key and self.viewport.take_before_shortcuts(event):
+        is_override = event.type() == QEvent.Type.ShortcutOverride and not self.viewport.hasFocus()
+        if is_override and isinstance(event, QKeyEvent) and self.viewport.take_before_shortcuts(event):
             return True
         return super().event(event)
 

@@ -77,7 +77,9 @@ def icon(name: str) -> QIcon:
         (QIcon.Mode.Active, QIcon.State.On, ACCENT),
         (QIcon.Mode.Disabled, QIcon.State.On, FAINT),
     )
-    ratios = {1.0, 2.0, QGuiApplication.instance().devicePixelRatio()}
+    app = QGuiApplication.instance()
+    assert isinstance(app, QGuiApplication)
+    ratios = {1.0, 2.0, app.devicePixelRatio()}
     for mode, state, color in states:
         renderer = QSvgRenderer(QByteArray(source.replace(b"currentColor", color.encode())))
         for size in ICON_SIZES:

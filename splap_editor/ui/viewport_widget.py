@@ -5,11 +5,20 @@ import sys
 from collections.abc import Callable
 from math import log
 from time import perf_counter
+from typing import Any, TypeVar
 
 os.environ.setdefault("QT_API", "pyside6")
 
 from PySide6.QtCore import QCoreApplication, QEvent, Qt, QTimer, Signal
-from PySide6.QtGui import QKeyEvent, QMouseEvent, QNativeGestureEvent, QSurfaceFormat, QWheelEvent
+from PySide6.QtGui import (
+    QFocusEvent,
+    QKeyEvent,
+    QMouseEvent,
+    QNativeGestureEvent,
+    QSinglePointEvent,
+    QSurfaceFormat,
+    QWheelEvent,
+)
 from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QLineEdit, QWidget
 from pyvistaqt import QtInteractor
 
@@ -26,6 +35,7 @@ COMPARE_KEY = "O"
 
 PointerTaker = Callable[[PointerEvent], bool]
 KeyTaker = Callable[[KeyEvent], bool]
+Told = TypeVar("Told", PointerEvent, KeyEvent)
 
 
 class ViewportWidget(QtInteractor):
@@ -100,7 +110,7 @@ class ViewportWidget(QtInteractor):
         else:
             self.update()
 
-    def close(self) -> None:
+    def close(self) -> None:  # type: ignore[override] # pyvistaqt gives nothing where Qt gives a bool
         """Free the GL objects; the widget shows nothing afterwards."""
         if self._is_ready:
             self._is_ready = False
@@ -163,9 +173,9 @@ class ViewportWidget(QtInteractor):
         """Let tools have a key before the shortcuts do, and a pinch before Qt does."""
         kind = event.type()
         if kind == QEvent.Type.ShortcutOverride:
-            if self.take_before_shortcuts(event):
+            if isinstance(event, QKeyEvent) and self.take_before_shortcuts(event):
                 return True
-        elif kind == QEvent.Type.NativeGesture:
+        elif isinstance(event, QNativeGestureEvent):
             return self._on_native_gesture(event)
         return super().event(event)
 
@@ -183,11 +193,11 @@ class ViewportWidget(QtInteractor):
         steps = log(max(1.0 + event.value(), 0.05)) / PINCH_NOTCH
         return self._pass("pinch", event, steps=steps)
 
-    def _pass(self, kind: str, event: QMouseEvent, **more: object) -> bool:
+    def _pass(self, kind: str, event: QSinglePointEvent, **more: Any) -> bool:
         self._pass_hover()
         return self._tell(self._pointer_taker, self._pointer_event(kind, event, **more))
 
-    def _pointer_event(self, kind: str, event: QMouseEvent, **more: object) -> PointerEvent:
+    def _pointer_event(self, kind: str, event: QSinglePointEvent, **more: Any) -> PointerEvent:
         ratio = self.devicePixelRatioF()
         held = event.modifiers()
         position = event.position()
@@ -205,7 +215,7 @@ class ViewportWidget(QtInteractor):
         )
 
     @staticmethod
-    def _tell(taker: Callable[[object], bool], event: object) -> bool:
+    def _tell(taker: Callable[[Told], bool], event: Told) -> bool:
         """Pass an event on; what goes wrong there reaches the exception hook, which Qt would keep it from."""
         try:
             return taker(event)
@@ -235,7 +245,7 @@ class ViewportWidget(QtInteractor):
             self._hold_compare(False)
         self._offer_key(event, pressed=False)
 
-    def focusOutEvent(self, event: QEvent) -> None:
+    def focusOutEvent(self, event: QFocusEvent) -> None:
         """Let go of held keys: their release goes elsewhere."""
         self._hold_compare(False)
         super().focusOutEvent(event)

@@ -72,7 +72,7 @@ def _screen_axes(view: View) -> NDArray[np.float64]:
     return np.stack([right, np.cross(right, view.direction)])
 
 
-def _turned(view: View, R: NDArray[np.float64], about: ArrayLike) -> View:
+def _turned(view: View, R: NDArray[np.float64], about: NDArray[np.float64]) -> View:
     return replace(
         view,
         position=about + R @ (view.position - about),
@@ -107,7 +107,7 @@ def orbited(
     height = np.arcsin(np.clip(-(view.direction @ pole) * sign, -1.0, 1.0))
     limit = np.arcsin(_STEEPEST)
     pitch = np.clip(height + pitch_rad, -max(limit, abs(height)), max(limit, abs(height))) - height
-    return _turned(view, turn(pole, -yaw_rad * sign) @ turn(right, -pitch), about)
+    return _turned(view, turn(pole, -yaw_rad * sign) @ turn(right, -float(pitch)), about)
 
 
 def panned(view: View, dx: float, dy: float) -> View:

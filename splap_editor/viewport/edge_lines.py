@@ -61,7 +61,8 @@ class EdgeLines:
         self._poly.SetPoints(splats.vtk_points)
         self.actor = unlit_actor(self._poly)
         self.actor.SetPosition(*splats.origin)
-        mapper: vtkPolyDataMapper = self.actor.GetMapper()
+        mapper = self.actor.GetMapper()
+        assert isinstance(mapper, vtkPolyDataMapper)
         mapper.SetVBOShiftScaleMethod(0)
         mapper.SetScalarModeToUseCellData()
         mapper.SetColorModeToDirectScalars()
@@ -173,9 +174,9 @@ def edges_within_hops(edges: FileRows, rows: ArrayLike, n_hops: int, n_splats: i
     """(E,) which edges (E, 2) are reached from the given rows in at most this many steps."""
     reached = np.zeros(n_splats, bool)
     reached[np.asarray(rows, np.intp)] = True
-    chosen = np.zeros(len(edges), bool)
+    chosen: NDArray[np.bool_] = np.zeros(len(edges), bool)
     for _ in range(n_hops):
-        step = reached[edges].any(axis=1)
+        step = np.asarray(reached[edges].any(axis=1))
         if (step == chosen).all():
             break
         chosen = step

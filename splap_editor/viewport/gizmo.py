@@ -83,7 +83,7 @@ class Gizmo:
     hovered: Part | None = None
     typed: float | None = None
     delta: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
-    amount: float | NDArray[np.float64] = 0.0
+    amount: float = 0.0
     _drag: _Drag | None = None
 
     # State --------------------------------------------------------------------------------------------------------
@@ -113,13 +113,13 @@ class Gizmo:
             return self._drag.axes
         if not self.is_local:
             return np.eye(3)
-        u, _, vt = np.linalg.svd(self.frame[:3, :3])
+        u, _, vt = np.linalg.svd(self._attached[:3, :3])
         return u @ vt if np.linalg.det(u @ vt) > 0 else u @ np.diag([1.0, 1.0, -1.0]) @ vt
 
     @property
     def shown_frame(self) -> NDArray[np.float64]:
         """(4, 4) frame where the gizmo is drawn: it travels with a drag, but neither turns nor scales."""
-        shown = self._drag.frame.copy() if self._drag else self.frame.copy()
+        shown = (self._drag.frame if self._drag else self._attached).copy()
         if self._drag and self._drag.part.act is Act.TRANSLATE:
             shown[:3, 3] += self.delta[:3, 3]
         return shown
@@ -138,8 +138,20 @@ class Gizmo:
             return False
         if part.lock is Lock.VIEW or part.act is Act.ROTATE:
             return True
-        toward = abs(self.axes[:, part.axis] @ line_of_sight(projection, self.frame[:3, 3]))
+        toward = abs(float(self.axes[:, part.axis] @ line_of_sight(projection, self._attached[:3, 3])))
         return bool(toward < 0.985 if part.lock is Lock.AXIS else toward > 0.2)
+
+    @property
+    def _attached(self) -> NDArray[np.float64]:
+        """The frame, for what is asked only while there is one."""
+        assert self.frame is not None
+        return self.frame
+
+    @property
+    def _dragging(self) -> _Drag:
+        """The drag, for what is asked only while there is one."""
+        assert self._drag is not None
+        return self._drag
 
     # Hit test -----------------------------------------------------------------------------------------------------
 
@@ -159,13 +171,13 @@ class Gizmo:
 
     def _distance(self, part: Part, projection: Projection, cursor: NDArray[np.float64]) -> float:
         """Pixels from the cursor to a part, a little in favour of small and important ones."""
-        origin, size = self.frame[:3, 3], self.arm_length(projection)
+        origin, size = self._attached[:3, 3], self.arm_length(projection)
         axes, px = self.axes, self.scale
         if part == DOT:
-            return max(np.linalg.norm(projection.pixel(origin) - cursor) - DOT_RADIUS * self.size_px * px, 0.0)
+            return max(float(np.linalg.norm(projection.pixel(origin) - cursor)) - DOT_RADIUS * self.size_px * px, 0.0)
         if part == SCALE_BOX:
             at = origin + SCALE_BOX_AT * size * (projection.right + projection.up)
-            return max(np.linalg.norm(projection.pixel(at) - cursor) - 5.0 * px, 0.0)
+            return max(float(np.linalg.norm(projection.pixel(at) - cursor)) - 5.0 * px, 0.0)
         if part.lock is Lock.PLANE:
             corners = projection.pixels(origin + size * square_corners(part.axis) @ axes.T)
             return 3.0 * px if is_inside(cursor, corners) else np.inf
@@ -182,19 +194,19 @@ class Gizmo:
         """Start a drag of a part, or a keyboard transform (G, R, S: `DOT`, `VIEW_RING`, `SCALE_BOX`)."""
         if not self.is_shown:
             raise ValueError("the gizmo is attached to nothing")
-        sight = line_of_sight(projection, self.frame[:3, 3])
+        sight = line_of_sight(projection, self._attached[:3, 3])
         axes = self.axes
         axis = projection.direction if part.lock is Lock.VIEW else axes[:, part.axis]
         if part == VIEW_RING:
             axis = sight
         start = np.array([x, y], np.float64)
-        self._drag = _Drag(part, projection, self.frame.copy(), axes, axis, start)
+        self._drag = _Drag(part, projection, self._attached.copy(), axes, axis, start)
         self._pointer, self._virtual, self._is_fine, self._turns = start, start, False, 0.0
         self.delta, self.amount, self.typed = np.eye(4), 0.0, None
 
     def bind(self, lock: Lock, axis: int = 2) -> NDArray[np.float64]:
         """Bind the drag under way to an axis or a plane (X, Shift+X …) or free it again; yields the delta."""
-        drag, pointer = self._drag, self._pointer
+        drag, pointer = self._dragging, self._pointer
         typed, is_fine = self.typed, self._is_fine
         self.begin(Part(drag.part.act, lock, axis), drag.projection, *drag.start)
         self.typed = typed
@@ -216,7 +228,7 @@ class Gizmo:
         self._virtual = self._virtual + (pointer - self._pointer) * (_FINE if self._is_fine else 1.0)
         self._pointer, self._is_fine = pointer, fine
         act = {Act.TRANSLATE: self._translation, Act.ROTATE: self._rotation, Act.SCALE: self._scaling}
-        self.delta = act[self._drag.part.act](snap)
+        self.delta = act[self._dragging.part.act](snap)
         return self.delta
 
     def type(self, value: float | None) -> NDArray[np.float64]:
@@ -225,7 +237,7 @@ class Gizmo:
         A number that no pose could follow becomes the nearest that one can.
         """
         if value is not None:
-            is_factor = self._drag.part.act is Act.SCALE
+            is_factor = self._dragging.part.act is Act.SCALE
             value = float(np.clip(value, *(SCALES if is_factor else (-LARGEST_COORDINATE, LARGEST_COORDINATE))))
         self.typed = value
         return self.move(*self._pointer, fine=self._is_fine)
@@ -240,21 +252,20 @@ class Gizmo:
         self._drag, self.typed, self.delta = None, None, np.eye(4)
 
     def _translation(self, snap: bool) -> NDArray[np.float64]:
-        drag, projection = self._drag, self._drag.projection
+        drag, projection = self._dragging, self._dragging.projection
         if self.typed is not None:
             axis = drag.axes[:, 0] if drag.part.lock is Lock.VIEW else drag.axis
             self.amount, shift = self.typed, self.typed * axis
         elif drag.part.lock is Lock.AXIS:
-            ends = (projection.on_line(*xy, drag.origin, drag.axis) for xy in (drag.start, self._virtual))
-            first, last = ends
-            self.amount = last - first
+            first, last = (projection.on_line(x, y, drag.origin, drag.axis) for x, y in (drag.start, self._virtual))
+            amount = last - first
             if snap:
                 step = self._translation_step()
-                self.amount = round(self.amount / step) * step
-            shift = self.amount * drag.axis
+                amount = round(amount / step) * step
+            self.amount, shift = amount, amount * drag.axis
         else:
-            first, last = (projection.on_plane(*xy, drag.origin, drag.axis) for xy in (drag.start, self._virtual))
-            shift = last - first
+            begin, end = (projection.on_plane(x, y, drag.origin, drag.axis) for x, y in (drag.start, self._virtual))
+            shift = end - begin
             if snap:
                 step = self._translation_step()
                 local = np.round(drag.axes.T @ shift / step) * step
@@ -267,12 +278,11 @@ class Gizmo:
         return delta
 
     def _translation_step(self) -> float:
-        return float(
-            10.0 ** np.round(np.log10(self._drag.projection.world_per_pixel(self._drag.origin) * 40.0 * self.scale))
-        )
+        drag = self._dragging
+        return float(10.0 ** np.round(np.log10(drag.projection.world_per_pixel(drag.origin) * 40.0 * self.scale)))
 
     def _rotation(self, snap: bool) -> NDArray[np.float64]:
-        drag = self._drag
+        drag = self._dragging
         if self.typed is not None:
             angle = np.radians(self.typed)
         else:
@@ -287,10 +297,11 @@ class Gizmo:
         return _about(drag.origin, turn(drag.axis, angle))
 
     def _is_edge_on(self) -> bool:
-        return abs(self._drag.axis @ line_of_sight(self._drag.projection, self._drag.origin)) < _EDGE_ON
+        drag = self._dragging
+        return abs(float(drag.axis @ line_of_sight(drag.projection, drag.origin))) < _EDGE_ON
 
     def _pointer_angle(self, xy: NDArray[np.float64]) -> float:
-        drag, projection = self._drag, self._drag.projection
+        drag, projection = self._dragging, self._dragging.projection
         if self._is_edge_on():
             # Seen edge-on the ring is a line: motion along it, as on the rim of a wheel.
             sight = line_of_sight(projection, drag.origin)
@@ -301,16 +312,16 @@ class Gizmo:
                 RING_RADIUS * self.size_px * self.scale
             )
         u, v = _across(drag.axis)
-        arm = projection.on_plane(*xy, drag.origin, drag.axis) - drag.origin
+        arm = projection.on_plane(xy[0], xy[1], drag.origin, drag.axis) - drag.origin
         return float(np.arctan2(arm @ v, arm @ u))
 
     def _scaling(self, snap: bool) -> NDArray[np.float64]:
-        drag = self._drag
+        drag = self._dragging
         if self.typed is not None:
             factor = self.typed
         else:
             center = drag.projection.pixel(drag.origin)
-            reach = max(np.linalg.norm(drag.start - center), 1.0)
+            reach = max(float(np.linalg.norm(drag.start - center)), 1.0)
             factor = max(float(np.linalg.norm(self._virtual - center)) / reach, 0.01)
             if snap:
                 factor = max(np.round(factor / self.scale_snap), 1.0) * self.scale_snap

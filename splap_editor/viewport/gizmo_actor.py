@@ -122,8 +122,8 @@ class GizmoActor:
         gizmo = self._gizmo
         for part, actor in self._parts.items():
             actor.SetVisibility(gizmo.is_shown and gizmo.is_part_shown(part, projection))
-        part = gizmo.dragged
-        self._guide.SetVisibility(part is not None and part.lock is Lock.AXIS)
+        dragged = gizmo.dragged
+        self._guide.SetVisibility(dragged is not None and dragged.lock is Lock.AXIS)
         if not gizmo.is_shown:
             return
         origin = gizmo.shown_frame[:3, 3]
@@ -131,23 +131,22 @@ class GizmoActor:
         screen = np.column_stack([projection.right, projection.up, -projection.direction])
         sight = line_of_sight(projection, origin)
         for part, actor in self._parts.items():
-            is_hot = part in (gizmo.hovered, gizmo.dragged)
+            is_hot = part in (gizmo.hovered, dragged)
             base = _WHITE if part.lock is Lock.VIEW else AXIS_COLORS[part.axis]
             actor.GetProperty().SetColor(*(_HOVER if is_hot else base))
             actor.GetProperty().SetLineWidth((3.0 if is_hot else 2.0) * gizmo.scale)
             axes = gizmo.axes
             if part.act is Act.ROTATE:
-                line = ring_points(part, gizmo.axes, sight, projection, part == gizmo.dragged)
+                line = ring_points(part, gizmo.axes, sight, projection, part == dragged)
                 set_points(actor.GetMapper().GetInput(), line)
                 axes = np.eye(3)
             elif part.lock is Lock.VIEW:
                 axes = screen
             _place(actor, origin, size * axes)
-        if self._guide.GetVisibility():
-            part = gizmo.dragged
-            self._guide.GetProperty().SetColor(*AXIS_COLORS[part.axis])
+        if dragged is not None and dragged.lock is Lock.AXIS:
+            self._guide.GetProperty().SetColor(*AXIS_COLORS[dragged.axis])
             self._guide.GetProperty().SetLineWidth(1.0 * gizmo.scale)
-            _place(self._guide, origin, size * np.roll(gizmo.axes, 2 - part.axis, axis=1))
+            _place(self._guide, origin, size * np.roll(gizmo.axes, 2 - dragged.axis, axis=1))
 
 
 def _arrow(axis: int) -> tuple[NDArray[np.float64], vtkCellArray, vtkCellArray]:
@@ -175,5 +174,5 @@ def _place(actor: vtkActor, origin: NDArray[np.float64], axes: NDArray[np.float6
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = axes, origin
     vtk_matrix = vtkMatrix4x4()
-    vtk_matrix.DeepCopy(matrix.ravel())
+    vtk_matrix.DeepCopy(matrix.ravel().tolist())
     actor.SetUserMatrix(vtk_matrix)

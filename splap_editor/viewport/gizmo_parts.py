@@ -67,7 +67,7 @@ def square_corners(axis: int) -> NDArray[np.float64]:
 
 def ring_points(
     part: Part, axes: NDArray[np.float64], sight: NDArray[np.float64], projection: Projection, is_whole: bool
-):
+) -> NDArray[np.float64]:
     """(K, 3) line of a rotation part about the world's zero, in gizmo units.
 
     The half of a ring behind its centre is left out unless ``is_whole``, or
@@ -79,7 +79,7 @@ def ring_points(
         u, v, radius = axes[:, (part.axis + 1) % 3], axes[:, (part.axis + 2) % 3], RING_RADIUS
     middle, half = 0.0, np.pi
     if not is_whole and abs(sight @ np.cross(u, v)) < 0.985:
-        middle, half = np.arctan2(-sight @ v, -sight @ u), np.pi / 2.0
+        middle, half = float(np.arctan2(-sight @ v, -sight @ u)), np.pi / 2.0
     angles = np.linspace(middle - half, middle + half, 65)[:, None]
     return radius * (np.cos(angles) * u + np.sin(angles) * v)
 

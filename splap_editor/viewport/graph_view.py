@@ -145,7 +145,7 @@ class GraphView:
     def _update(self) -> None:
         scene, options = self._session.scene, self.options
         surface = scene.surface if scene is not None else None
-        if surface is None or options.shown == "off":
+        if scene is None or surface is None or options.shown == "off":
             self._job.drop()
             self._draw()
             return

@@ -86,7 +86,7 @@ class InspectView:
 
     def pick(self, row: FileRow | None) -> None:
         """Inspect a splat, or none; an edge that was inspected is let go."""
-        scene = self._session.scene
+        scene = self._session.shown_scene
         self.edge = None
         if row == scene.picked:
             self._update()
@@ -101,7 +101,7 @@ class InspectView:
     def neighbor_edges(self) -> FileRows:
         """(E, 2) file rows of the picked splat and each of its neighbours that are shown."""
         scene, both = self._session.scene, self.comparison
-        if both is None:
+        if scene is None or both is None:
             return np.empty((0, 2), np.int64)
         near = scene.ellipses.rows[np.concatenate([both.first, both.only_second])]
         return np.column_stack([np.full(len(near), scene.picked), near])
@@ -162,7 +162,7 @@ class InspectView:
             for name, (nodes, color) in zip(("both", "first", "second"), self._groups(), strict=False):
                 ends = np.asarray(scene.positions, np.float64)[scene.ellipses.rows[nodes]]
                 lines = [np.stack([start, end]) for end in ends]
-                rgb = tuple(part / 255.0 for part in color)
+                rgb = (color[0] / 255.0, color[1] / 255.0, color[2] / 255.0)
                 rings.show(name, lines, rgb, width_px=LINE_PX, is_closed=False)
         if self.edge is not None:
             ends = np.asarray(scene.positions, np.float64)[list(self.edge)]

@@ -23,12 +23,16 @@ def look_named(display: Mapping[str, object]) -> SplatLook:
     """How splats are drawn by options as a session file holds them; what is missing or odd is as usual."""
     mode = display.get("mode")
     look = DEFAULT_LOOKS[MODES[mode] if isinstance(mode, str) and mode in MODES else DisplayMode.SPLATS]
-    numbers = {}
+    sound: dict[str, float] = {}
     for name, largest in _LARGEST.items():
         value = display.get(name)
         if isinstance(value, int | float) and not isinstance(value, bool) and 0.0 <= value <= largest:
-            numbers[name] = float(value)
-    return replace(look, **numbers)
+            sound[name] = float(value)
+    return replace(
+        look,
+        size_factor=sound.get("size_factor", look.size_factor),
+        opacity_cut=sound.get("opacity_cut", look.opacity_cut),
+    )
 
 
 def background_named(display: Mapping[str, object]) -> tuple[tuple[float, float, float], tuple[float, float, float]]:

@@ -135,7 +135,7 @@ class Rings:
     def show(
         self,
         name: str,
-        loops: list[NDArray[np.floating]],
+        loops: Sequence[NDArray[np.floating]],
         color: tuple[float, float, float],
         *,
         width_px: float = 2.0,

@@ -151,8 +151,8 @@ def surface_hit(actor: SplatActor, projection: Projection, x: float, y: float) -
         actor.flags,
         np.float32(actor.look.size_factor if actor.look.mode is not DisplayMode.POINTS else 1.0),
         actor.cut_byte,
-        tuple(np.float32(start - actor.origin)),
-        tuple(np.float32(direction)),
+        tuple((start - actor.origin).astype(np.float32)),
+        tuple(direction.astype(np.float32)),
     )
     if not len(rows):
         return None

@@ -36,11 +36,11 @@ class Projection:
     @cached_property
     def clip_from_world(self) -> NDArray[np.float64]:
         """(4, 4) world to OpenGL clip coordinates."""
-        return self.clip_from_view @ self.view_from_world
+        return np.asarray(self.clip_from_view @ self.view_from_world, np.float64)
 
     @cached_property
     def _world_from_clip(self) -> NDArray[np.float64]:
-        return np.linalg.inv(self.clip_from_world)
+        return np.asarray(np.linalg.inv(self.clip_from_world), np.float64)
 
     @property
     def is_parallel(self) -> bool:
@@ -98,11 +98,12 @@ class Projection:
     def on_line(self, x: float, y: float, origin: ArrayLike, axis: ArrayLike) -> float:
         """Parameter ``t`` of the point ``origin + t axis`` nearest to the ray through a pixel; 0 if parallel."""
         start, direction = self.ray(x, y)
+        axis = np.asarray(axis, np.float64)
         normal = np.cross(axis, direction)
-        square = normal @ normal
-        if square < 1e-6 * (np.asarray(axis) @ axis):
+        square = float(normal @ normal)
+        if square < 1e-6 * float(np.square(axis).sum()):
             return 0.0
-        return float(np.cross(start - origin, direction) @ normal / square)
+        return float(np.cross(start - np.asarray(origin, np.float64), direction) @ normal / square)
 
     def on_plane(self, x: float, y: float, origin: ArrayLike, normal: ArrayLike) -> NDArray[np.float64]:
         """(3,) point where the ray through a pixel meets a plane.
@@ -112,13 +113,14 @@ class Projection:
         nearest to one far out on the ray.
         """
         start, direction = self.ray(x, y)
-        origin, normal = np.asarray(origin, np.float64), np.asarray(normal) / np.linalg.norm(normal)
-        slope = direction @ normal
+        at, across = np.array(origin, np.float64), np.asarray(normal, np.float64)
+        across = across / np.linalg.norm(across)
+        slope = direction @ across
         if abs(slope) < 1e-4:
-            return origin.copy()
-        farthest = _HORIZON * np.linalg.norm(origin - start)
-        t = (origin - start) @ normal / slope
+            return at
+        farthest = _HORIZON * np.linalg.norm(at - start)
+        t = (at - start) @ across / slope
         if not self.is_parallel and not 0.0 <= t <= farthest:
             far = start + direction * farthest
-            return far - normal * ((far - origin) @ normal)
+            return far - across * ((far - at) @ across)
         return start + direction * t

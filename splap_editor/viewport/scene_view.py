@@ -209,7 +209,8 @@ class SceneView:
 
     def rows_of_pins(self, pin_ids: Iterable[int]) -> FileRows:
         """File rows that these pins hold."""
-        rows = [pin_rows(self._scene, self._scene.edit.pin(pin_id)) for pin_id in pin_ids]
+        scene = self._session.shown_scene
+        rows = [pin_rows(scene, scene.edit.pin(pin_id)) for pin_id in pin_ids]
         return np.concatenate(rows) if rows else np.empty(0, np.int64)
 
     def show_free_ring(self, is_shown: bool) -> None:
@@ -217,7 +218,7 @@ class SceneView:
         scene, rings = self._scene, self.viewport.rings
         rings.hide("free")
         free = scene.edit.options[ReachOptions].free_radius if is_shown and scene is not None else None
-        if free is not None:
+        if scene is not None and free is not None:
             radius = world_length(free, scene.ellipses.scene_scale)
             direction = self.viewport.projection.direction
             handles = [handle for handle in scene.edit.active_handles if handle.handle_id in scene.active_handles]
@@ -239,6 +240,7 @@ class SceneView:
     def presenter(self) -> Callable[[AdaptedKernels], HandOver]:
         """Sort and colour kernels of the scene on screen, for the view as it is when they have been made."""
         depicted = self._depicted
+        assert depicted is not None  # the scene on screen has been depicted before
 
         def present(kernels: AdaptedKernels) -> HandOver:
             made = presented(depicted, kernels, self._seen)
@@ -253,28 +255,31 @@ class SceneView:
     # Following the scene ------------------------------------------------------------------------------------------
 
     def _on_scene_changed(self) -> None:
-        self._scene = scene = self._session.scene
+        self._scene = scene = self._session.shown_scene
         self._tinted_for, self._paints, self._marks = (), {}, ()
         self.viewport.gizmo.detach()
         if self._depicts is not scene.splats:
             self.depict(scene.splats)()
-        self.viewport.splats.load(self._depicted.rest, self._depicted.colors, scene.ellipses.subject)
-        self.viewport.camera.world_up = np.array(self.preferred_up or suggested_up(scene.splats))
+        depicted = self._depicted
+        assert depicted is not None
+        self.viewport.splats.load(depicted.rest, depicted.colors, scene.ellipses.subject)
+        self.viewport.camera.world_up = np.array(self.preferred_up or suggested_up(scene.splats), np.float64)
         self.viewport.reset_camera()
         self._show_flags()
         self._show_handles()
 
     @property
-    def _is_shown(self) -> bool:
-        return self._scene is not None and self.viewport.splats.deformed is not None
+    def _shown(self) -> Scene | None:
+        """The scene, unless there is nothing of it in the picture."""
+        return self._scene if self.viewport.splats.deformed is not None else None
 
     def _show_pose(self) -> None:
-        if not self._is_shown:
+        scene, splats, depicted = self._shown, self.viewport.splats, self._depicted
+        if scene is None or depicted is None:
             return
-        scene, splats = self._scene, self.viewport.splats
         kernels, (presents, made) = scene.kernels, self._presented
         if kernels is None:
-            rest = self._depicted.rest
+            rest = depicted.rest
             splats.move(rest.means, rest.axes_u, rest.axes_v)
             self._ask_for_view()
         else:
@@ -286,51 +291,38 @@ class SceneView:
         self._show_tints()
 
     def _show_flags(self) -> None:
-        if not self._is_shown:
+        scene = self._shown
+        if scene is None:
             return
-        flags = np.where(self._scene.selection, np.uint8(SplatFlag.SELECTED), np.uint8(0))
-        flags |= np.where(self._scene.hidden, np.uint8(SplatFlag.HIDDEN), np.uint8(0))
+        flags = np.where(scene.selection, np.uint8(SplatFlag.SELECTED), np.uint8(0))
+        flags |= np.where(scene.hidden, np.uint8(SplatFlag.HIDDEN), np.uint8(0))
         self.viewport.splats.set_flags(flags)
 
     def _show_handles(self) -> None:
-        if not self._is_shown:
+        scene, viewport = self._shown, self.viewport
+        if scene is None:
             return
-        scene, viewport = self._scene, self.viewport
         handles = scene.shown_edit.active_handles
-        viewport.markers.show(self._marks_of_edit())
+        viewport.markers.show(_marks_of_edit(scene))
         if viewport.gizmo.dragged is None:
             chosen = {handle.handle_id: handle for handle in handles}
-            self._place_gizmo([chosen[handle_id] for handle_id in scene.active_handles if handle_id in chosen])
+            self._place_gizmo(scene, [chosen[handle_id] for handle_id in scene.active_handles if handle_id in chosen])
         self._show_tints()
         viewport.gizmo_changed()
 
-    def _marks_of_edit(self) -> list[Mark]:
-        """Marks of pins and handles, the active one on top, and of the placed pivot."""
-        scene, marks = self._scene, []
-        for pin in scene.edit.pins:
-            is_chosen = pin.pin_id in scene.active_pins
-            marks.append(Mark(pin.region.center, rgb(PIN_COLOR), MarkShape.SQUARE, is_chosen=is_chosen))
-        for handle in scene.shown_edit.active_handles:
-            is_chosen, is_active = handle.handle_id in scene.active_handles, handle.handle_id == scene.active_handle
-            marks.append(Mark(handle.moved_center, rgb(handle.color), is_chosen=is_chosen, is_active=is_active))
-        marks.sort(key=lambda mark: (mark.is_chosen, mark.is_active))
-        if scene.pivot is Pivot.POINT and scene.pivot_at is not None:
-            marks.append(Mark(scene.pivot_at, (255, 255, 255), MarkShape.CROSS))
-        return marks
-
-    def _place_gizmo(self, handles: list[Handle]) -> None:
+    def _place_gizmo(self, scene: Scene, handles: list[Handle]) -> None:
         if not handles:
             self.viewport.gizmo.detach()
             return
         frame = np.eye(4)
         frame[:3, :3] = quats_to_matrices(np.array([handles[-1].pose.rotate]))[0]
-        frame[:3, 3] = pivot_point(self._scene.pivot, self._scene.pivot_at, handles)
+        frame[:3, 3] = pivot_point(scene.pivot, scene.pivot_at, handles)
         self.viewport.gizmo.attach(frame)
 
     def _show_tints(self) -> None:
         """Tint what handles hold in their colours and darken what is fixed, once something is bound."""
-        scene, bound = self._scene, self._session.bound
-        if not self._is_shown:
+        scene, depicted, bound = self._shown, self._depicted, self._session.bound
+        if scene is None or depicted is None:
             return
         paint = next(reversed(self._paints.values()), None)
         edit = scene.edit
@@ -338,7 +330,9 @@ class SceneView:
         is_known = bound is not None and len(bound.edit.active_handles) == len(colors) > 0
         is_tinted = self._shows_tints and (is_known or bool(edit.pins))
         regions = tuple(id(pin.region) for pin in edit.pins)
-        wanted = (bound if is_known else None, colors, regions, self._fixed_tint) if is_tinted else ()
+        wanted: tuple[object, ...] = (
+            (bound if is_known else None, colors, regions, self._fixed_tint) if is_tinted else ()
+        )
         if paint is not None:
             wanted = ("painted",)
         if wanted == self._tinted_for:
@@ -350,7 +344,7 @@ class SceneView:
         if paint is not None:
             tints = paint
         elif wanted:
-            fixed = fixed_tint(self._fixed_tint, self._depicted.colors)
+            fixed = fixed_tint(self._fixed_tint, depicted.colors)
             tints = edit_tints(scene, bound if is_known else None, fixed)
         else:
             tints = np.zeros((scene.splats.n_splats, 4), np.uint8)
@@ -372,10 +366,10 @@ class SceneView:
         self._view_job.when_free(self._present)
 
     def _present(self) -> None:
-        scene = self._scene
-        if scene is None:
+        scene, depicted = self._scene, self._depicted
+        if scene is None or depicted is None:
             return
-        kernels, seen, depicted, splats = scene.kernels, self._seen, self._depicted, self.viewport.splats
+        kernels, seen, splats = scene.kernels, self._seen, self.viewport.splats
         sorts_original = seen.is_blended and splats.has_original
 
         def present(job: Job) -> tuple[Presented, RowsByPlace | None]:
@@ -383,7 +377,7 @@ class SceneView:
             return made, depth_order(_rest_means(depicted), seen.direction) if sorts_original else None
 
         def done(both: tuple[Presented, RowsByPlace | None]) -> None:
-            if self._scene is not scene or not self._is_shown:
+            if self._shown is not scene:
                 return
             made, original_order = both
             if original_order is not None:
@@ -395,6 +389,21 @@ class SceneView:
                     splats.set_colors(made.colors)
 
         self._view_job.ask(present, done)
+
+
+def _marks_of_edit(scene: Scene) -> list[Mark]:
+    """Marks of pins and handles, the active one on top, and of the placed pivot."""
+    marks: list[Mark] = []
+    for pin in scene.edit.pins:
+        is_chosen = pin.pin_id in scene.active_pins
+        marks.append(Mark(pin.region.center, rgb(PIN_COLOR), MarkShape.SQUARE, is_chosen=is_chosen))
+    for handle in scene.shown_edit.active_handles:
+        is_chosen, is_active = handle.handle_id in scene.active_handles, handle.handle_id == scene.active_handle
+        marks.append(Mark(handle.moved_center, rgb(handle.color), is_chosen=is_chosen, is_active=is_active))
+    marks.sort(key=lambda mark: (mark.is_chosen, mark.is_active))
+    if scene.pivot is Pivot.POINT and scene.pivot_at is not None:
+        marks.append(Mark(scene.pivot_at, (255, 255, 255), MarkShape.CROSS))
+    return marks
 
 
 def _rest_means(depicted: Depiction) -> NDArray[np.float32]:

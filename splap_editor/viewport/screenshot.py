@@ -8,6 +8,7 @@ from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow
 
 from splap_editor.viewport.camera import Camera
 from splap_editor.viewport.depth_order import depth_order
+from splap_editor.viewport.edge_lines import EdgeLines
 from splap_editor.viewport.splat_actor import DisplayMode
 from splap_editor.viewport.viewport import Viewport
 
@@ -19,7 +20,7 @@ def window_pixels(window: vtkRenderWindow) -> NDArray[np.uint8]:
     """(H, W, 4) uint8 RGBA of what a window has drawn last, top row first; alpha as blended, colours premultiplied."""
     width, height = window.GetSize()
     pixels = vtkUnsignedCharArray()
-    window.GetRGBACharPixelData(0, 0, width - 1, height - 1, 0, pixels)
+    window.GetRGBACharPixelData(0, 0, width - 1, height - 1, 0, pixels, 0)
     return vtk_to_numpy(pixels).reshape(height, width, 4)[::-1].copy()
 
 
@@ -81,7 +82,8 @@ def _drawn(viewport: Viewport, width: int, height: int, samples: int, is_transpa
     window.AddRenderer(renderer)
     camera = Camera(renderer)
     camera.view = viewport.camera.view
-    boxes = []
+    boxes, lines = [], viewport.splats.edges
+    edges: EdgeLines | None = None
     for actor in viewport.splats.shown_actors():
         twin = actor.twin(size_in_pixels=samples)
         twin.set_viewport_size(width, height)
@@ -89,11 +91,11 @@ def _drawn(viewport: Viewport, width: int, height: int, samples: int, is_transpa
         boxes.append(twin.bounds())
         if viewport.splats.mode is DisplayMode.SPLATS:
             twin.set_order(depth_order(twin.means, camera.projection().direction))
-        if viewport.splats.edges.n_edges and (actor is viewport.splats.shown):
-            edges = viewport.splats.edges.twin(twin, renderer, samples)
+        if lines is not None and lines.n_edges and (actor is viewport.splats.shown):
+            edges = lines.twin(twin, renderer, samples)
     if boxes:
         camera.fit_clipping(np.array([np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]]))
-        if viewport.splats.edges.n_edges:
+        if edges is not None:
             edges.refresh(camera.projection())
     window.Render()
     pixels = window_pixels(window)

@@ -11,7 +11,7 @@ from vtkmodules.vtkCommonCore import VTK_INT, vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkDataObject, vtkPolyData
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
-from splap_editor.core.index_spaces import RowsByPlace
+from splap_editor.core.index_spaces import FileRows, RowsByPlace
 from splap_editor.core.splats.main_subject import MainSubject
 from splap_editor.core.twofold_loop import TwofoldLoop
 from splap_editor.resources import shader
@@ -316,7 +316,9 @@ class SplatActor:
         self._modified("colors")
 
     def _index(self) -> None:
-        rows = self._shuffled[: self.n_drawn] if self._thinning > 1 else np.arange(self.n_splats, dtype=np.int32)
+        rows: FileRows = np.arange(self.n_splats, dtype=np.int32)
+        if self._thinning > 1:
+            rows = self._shuffled[: self.n_drawn]
         if self._order is not None:
             rows = self._order
             if self._thinning > 1:

@@ -101,6 +101,12 @@ class SplatScene:
         self.deformed = self.edges = self._original = self._rest = self._seen = self._highlighted = None
         self.request_render()
 
+    @property
+    def _loaded(self) -> SplatActor:
+        """The deformed splats, for who asks only while there is a scene."""
+        assert self.deformed is not None
+        return self.deformed
+
     def move(
         self,
         means: NDArray[np.floating],
@@ -111,7 +117,7 @@ class SplatScene:
         order: RowsByPlace | None = None,
     ) -> None:
         """Show deformed splats: centres and 1-sigma axes (N, 3); ``order``: their `depth_order`, if known."""
-        self.deformed.set_geometry(means, axes_u, axes_v, thickness)
+        self._loaded.set_geometry(means, axes_u, axes_v, thickness)
         if order is not None:
             self.set_order(order)
         else:
@@ -120,12 +126,12 @@ class SplatScene:
 
     def set_colors(self, colors: NDArray[np.uint8]) -> None:
         """Overwrite colours and opacities (N, 4) of the deformed splats, as after a turn of the view."""
-        self.deformed.set_colors(colors)
+        self._loaded.set_colors(colors)
         self.request_render()
 
     def set_tints(self, tints: NDArray[np.uint8] | None) -> None:
         """Lay colours (N, 4) uint8, the fourth their share, over the deformed splats: handles, free and fixed."""
-        self.deformed.set_tints(tints)
+        self._loaded.set_tints(tints)
         self.request_render()
 
     def set_flags(self, flags: NDArray[np.uint8]) -> None:
@@ -152,7 +158,7 @@ class SplatScene:
 
     def set_order(self, order: RowsByPlace) -> None:
         """Take a `depth_order` that the worker made for the deformed splats."""
-        self.deformed.set_order(order)
+        self._loaded.set_order(order)
         self._needs_order = False
         self.request_render()
 
@@ -201,7 +207,7 @@ class SplatScene:
         self._apply_looks()
 
     def _apply_looks(self) -> None:
-        if self.deformed is None:
+        if self.deformed is None or self._rest is None:
             return
         is_both = self._compare is Compare.BOTH
         if self._compare is not Compare.DEFORMED and self._original is None:
@@ -247,24 +253,25 @@ class SplatScene:
 
     def prepare(self, projection: Projection, thinning: int, background: tuple[float, float, float]) -> None:
         """Bring uniforms, thinning and drawing order up to the picture that comes next."""
-        if self.deformed is None:
+        if self.deformed is None or self.edges is None:
             return
         for actor in (self.deformed, self._original):
             if actor:
                 actor.set_viewport_size(projection.width, projection.height)
                 actor.set_thinning(thinning)
-        self._follow_turn(projection)
+        self._follow_turn(projection, self.deformed)
         self.edges.background = background
         self.edges.refresh(projection, thinning)
 
-    def _follow_turn(self, projection: Projection) -> None:
+    def _follow_turn(self, projection: Projection, deformed: SplatActor) -> None:
         """Sort again, and tell the host, when the view has turned far enough to show."""
         direction = projection.direction
-        has_turned = self._seen is None or self._seen.direction @ direction < np.cos(_TURN_RAD)
-        if not has_turned and not projection.is_parallel:
+        seen = self._seen
+        has_turned = seen is None or bool(seen.direction @ direction < np.cos(_TURN_RAD))
+        if seen is not None and not has_turned and not projection.is_parallel:
             # A near eye that moves sees splats from new sides though it does not turn.
-            distance = np.linalg.norm(projection.eye - self.deformed.origin)
-            has_turned = np.linalg.norm(projection.eye - self._seen.eye) > _MOVE_SHARE * distance
+            distance = np.linalg.norm(projection.eye - deformed.origin)
+            has_turned = bool(np.linalg.norm(projection.eye - seen.eye) > _MOVE_SHARE * distance)
         if has_turned:
             self._seen = projection
             if self.view_turned:
@@ -273,7 +280,7 @@ class SplatScene:
             return
         needs_order = self._needs_order or (has_turned and not self.view_turned)
         if needs_order:
-            self.deformed.set_order(depth_order(self.deformed.means, direction))
+            deformed.set_order(depth_order(deformed.means, direction))
             self._needs_order = False
         if self._original and (needs_order or self._original.is_unordered):
             self._original.set_order(depth_order(self._original.means, direction))

@@ -31,12 +31,12 @@ _DARK = 70.0
 
 def fixed_tint(name: str, colors: NDArray[np.uint8]) -> Rgba:
     """Colour of what cannot move, over splats of these colours (N, 4)."""
-    tint = FIXED_TINTS[name]
-    if tint is not None:
-        return tint
+    known = {named: tint for named, tint in FIXED_TINTS.items() if tint is not None}
+    if name in known:
+        return known[name]
     seen = colors[colors[:, 3] > 100, :3]
     is_dark = len(seen) > 0 and float(np.median(seen.mean(axis=1))) < _DARK
-    return FIXED_TINTS["lighter" if is_dark else "darker"]
+    return known["lighter" if is_dark else "darker"]
 
 
 def pin_rows(scene: Scene, pin: Pin) -> FileRows:

@@ -7,6 +7,7 @@ from time import perf_counter
 import numpy as np
 import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - registers the OpenGL implementations
 from numpy.typing import ArrayLike, NDArray
+from vtkmodules.vtkCommonCore import vtkCommand
 from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow
 
 from splap_editor.core.index_spaces import FileMask
@@ -89,9 +90,9 @@ class Viewport:
         self._frame_start = 0.0
         self.set_background(*BACKGROUND)
         self._observed = [
-            (self.renderer, self.renderer.AddObserver("StartEvent", self._on_frame_started)),
-            (window, window.AddObserver("StartEvent", self._on_window_started)),
-            (window, window.AddObserver("EndEvent", self._on_window_ended)),
+            (self.renderer, self.renderer.AddObserver(vtkCommand.StartEvent, self._on_frame_started)),
+            (window, window.AddObserver(vtkCommand.StartEvent, self._on_window_started)),
+            (window, window.AddObserver(vtkCommand.EndEvent, self._on_window_ended)),
         ]
 
     def close(self) -> None:
@@ -112,7 +113,7 @@ class Viewport:
         self.renderer.SetGradientBackground(bottom != top)
         self.renderer.SetBackground(*bottom)
         self.renderer.SetBackground2(*top)
-        self._background = tuple(float(c) for c in np.add(bottom, top) / 2.0)
+        self._background: tuple[float, float, float] = tuple((np.add(bottom, top) / 2.0).tolist())
         self.request_render()
 
     def set_scale(self, scale: float) -> None:
@@ -238,11 +239,10 @@ class Viewport:
     # Frames -------------------------------------------------------------------------------------------------------
 
     def _on_frame_started(self, *_: object) -> None:
-        box = self.splats.bounds()
-        if box is not None:
-            self.camera.fit_clipping(box, self.splats.deformed.subject.corners)
+        box, actor = self.splats.bounds(), self.splats.deformed
+        if box is not None and actor is not None:
+            self.camera.fit_clipping(box, actor.subject.corners)
         projection = self.projection
-        actor = self.splats.deformed
         thinning = self.thinning.choose(actor.n_splats) if actor and self.is_moving else 1
         self.splats.prepare(projection, thinning, self._background)
         self._overlay_camera(projection)

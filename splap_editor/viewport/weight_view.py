@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.handle_nodes import Region, handle_nodes
-from splap_editor.core.options import world_length
+from splap_editor.core.options import Length, world_length
 from splap_editor.engine.edit import Handle
 from splap_editor.session.scene import Scene
 from splap_editor.session.scene_follower import SceneFollower
@@ -88,18 +88,20 @@ class WeightView:
 
     def _show_weights(self) -> None:
         scene, bound = self._session.scene, self._session.bound
-        handle, column = None, -1
-        if self._is_on and scene is not None and scene.surface is not None and bound is not None:
-            row = scene.edit.deformer
-            shown = bound.edit.active_handles if row.has_weights and bound.edit.deformer == row else ()
-            handle = self._chosen() or next(iter(shown), None)
-            ids = [each.handle_id for each in shown]
-            column = ids.index(handle.handle_id) if handle is not None and handle.handle_id in ids else -1
-        if column < 0:
+        surface = scene.surface if scene is not None else None
+        deformer = bound.weighted if bound is not None else None
+        if not self._is_on or scene is None or surface is None or bound is None or deformer is None:
             self._take(None, None, None)
-        elif self._painted is None or self._painted[0] is not bound.deformer or self._painted[1] != column:
-            weights = splat_weights(scene.surface, bound.deformer, column)
-            self._take((bound.deformer, column), weight_tints(weights), handle)
+            return
+        shown = bound.edit.active_handles if bound.edit.deformer == scene.edit.deformer else ()
+        handle = self._chosen() or next(iter(shown), None)
+        ids = [each.handle_id for each in shown]
+        if handle is None or handle.handle_id not in ids:
+            self._take(None, None, None)
+            return
+        column = ids.index(handle.handle_id)
+        if self._painted is None or self._painted[0] is not deformer or self._painted[1] != column:
+            self._take((deformer, column), weight_tints(splat_weights(surface, deformer, column)), handle)
         else:
             self._take(self._painted, None, handle)
 
@@ -113,15 +115,15 @@ class WeightView:
 
     # Cage ---------------------------------------------------------------------------------------------------------
 
-    def _show_cage(self, radius: float | None) -> None:
+    def _show_cage(self, length: Length) -> None:
+        self._viewport.cage.hide()
         scene, handle = self._session.scene, self._chosen()
-        radius = world_length(radius, scene.ellipses.scene_scale) if handle is not None else None
         # A drag shows the deformed object; the cage is of the one at rest.
-        if radius is None or radius <= 0 or scene.preview is not None:
-            self._viewport.cage.hide()
-        else:
-            color = tuple(int(handle.color[k : k + 2], 16) / 255 for k in (1, 3, 5))
-            self._viewport.cage.show(self._nodes_of(scene, handle), radius, color)
+        if scene is not None and handle is not None and scene.preview is None:
+            radius = world_length(length, scene.ellipses.scene_scale)
+            if radius is not None and radius > 0:
+                r, g, b = (int(handle.color[k : k + 2], 16) / 255 for k in (1, 3, 5))
+                self._viewport.cage.show(self._nodes_of(scene, handle), radius, (r, g, b))
         self._viewport.request_render()
 
     def _nodes_of(self, scene: Scene, handle: Handle) -> NDArray[np.float64]:

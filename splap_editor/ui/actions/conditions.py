@@ -32,7 +32,8 @@ class State:
     @property
     def splat_graph(self) -> SplatGraph | None:
         """Its graph, once it is prepared."""
-        return self.scene.surface.graph if has_surface(self) else None
+        surface = self.scene.surface if self.scene is not None else None
+        return surface.graph if surface is not None else None
 
 
 def always(state: State) -> bool:
@@ -57,7 +58,7 @@ def has_selection(state: State) -> bool:
 
 def has_rest(state: State) -> bool:
     """Splats are selected, and others are not."""
-    return has_selection(state) and not state.scene.selection.all()
+    return state.scene is not None and has_selection(state) and not state.scene.selection.all()
 
 
 def has_selection_on_surface(state: State) -> bool:
@@ -72,7 +73,7 @@ def has_hidden(state: State) -> bool:
 
 def has_weights(state: State) -> bool:
     """Handles have weights to be shown."""
-    return has_handles(state) and state.scene.edit.deformer.has_weights
+    return state.scene is not None and has_handles(state) and state.scene.edit.deformer.has_weights
 
 
 def has_handles(state: State) -> bool:
@@ -127,8 +128,8 @@ def is_halted(state: State) -> bool:
 
 def has_edge(state: State) -> bool:
     """The inspected edge joins its splats."""
-    graph, edge = state.splat_graph, state.graph.inspected.edge
-    return graph is not None and edge is not None and is_joined(state.scene.ellipses, graph, edge)
+    scene, graph, edge = state.scene, state.splat_graph, state.graph.inspected.edge
+    return scene is not None and graph is not None and edge is not None and is_joined(scene.ellipses, graph, edge)
 
 
 def has_side_a(state: State) -> bool:
@@ -144,5 +145,7 @@ def has_fragments(state: State) -> bool:
 
 def has_mends(state: State) -> bool:
     """Edges were cut or added by hand or by strokes."""
-    graph = state.scene.edit.graph if has_surface(state) else None
-    return graph is not None and bool(graph.cut or graph.add or graph.separate or graph.join)
+    if state.scene is None or not has_surface(state):
+        return False
+    graph = state.scene.edit.graph
+    return bool(graph.cut or graph.add or graph.separate or graph.join)

@@ -3,10 +3,12 @@
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 from PySide6.QtCore import QSettings, Qt
-from PySide6.QtWidgets import QFileDialog, QWidget
+from PySide6.QtWidgets import QFileDialog
 
 from splap_editor.io.session_file import SUFFIX
 from splap_editor.io.session_specs import Scalar, SessionFile, ViewSpec
@@ -22,6 +24,9 @@ from splap_editor.ui.widgets.toast import Toast
 from splap_editor.viewport.camera import View
 from splap_editor.viewport.viewport import Viewport
 
+if TYPE_CHECKING:
+    from splap_editor.ui.main_window import MainWindow
+
 SESSION_FILTER = f"SpLap session (*{SUFFIX})"
 
 
@@ -30,7 +35,7 @@ class DocumentActions:
 
     Parameters
     ----------
-    window : QWidget
+    window : MainWindow
         Parent of the dialogs.
     session : Session
     documents : Documents
@@ -44,7 +49,7 @@ class DocumentActions:
 
     def __init__(
         self,
-        window: QWidget,
+        window: "MainWindow",
         session: Session,
         documents: Documents,
         autosave: Autosave,
@@ -76,7 +81,7 @@ class DocumentActions:
 
     def save_as(self) -> None:
         """Ask where to, and save there from now on."""
-        source = self._documents.path or self._session.scene.file.path
+        source = self._documents.path or self._session.shown_scene.file.path
         suggested = folder_to_write(source) / f"{source.stem}{SUFFIX}"
         dialog = QFileDialog(self._window, "Save the session", str(suggested))
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
@@ -101,19 +106,25 @@ class DocumentActions:
 
     def _look(self) -> Look:
         camera, view = self._viewport.camera, self._viewport.camera.view
-        vectors = (tuple(np.asarray(v, np.float64).tolist()) for v in (view.position, view.focal_point, view.view_up))
-        up = tuple(np.asarray(camera.world_up, np.float64).tolist())
-        spec = ViewSpec(*vectors, float(view.angle), view.is_parallel, camera.is_turntable, up)
+        spec = ViewSpec(
+            _vector(view.position),
+            _vector(view.focal_point),
+            _vector(view.view_up),
+            float(view.angle),
+            view.is_parallel,
+            camera.is_turntable,
+            _vector(camera.world_up),
+        )
         options = asdict(self._display.options)
         return Look(spec, {name: value for name, value in options.items() if isinstance(value, Scalar)})
 
     def _on_opened(self, session: SessionFile, notes: list[str]) -> None:
         if session.view is not None:
             spec, camera = session.view, self._viewport.camera
-            vectors = (np.array(v, np.float64) for v in (spec.position, spec.focal_point, spec.view_up))
+            eye, focus, up = (np.array(v, np.float64) for v in (spec.position, spec.focal_point, spec.view_up))
             camera.world_up = np.array(spec.world_up, np.float64)
             camera.is_turntable = spec.is_turntable
-            camera.view = View(*vectors, spec.angle, spec.is_parallel)
+            camera.view = View(eye, focus, up, spec.angle, spec.is_parallel)
             self._viewport.camera_moved()
             self._window.actions_.check("view.orthographic", spec.is_parallel)
             self._window.actions_.check("view.turntable", spec.is_turntable)
@@ -124,7 +135,7 @@ class DocumentActions:
     # ---------------------------------------------------------------- results
 
     def _note_recent(self) -> None:
-        path = self._documents.path or self._session.scene.file.path
+        path = self._documents.path or self._session.shown_scene.file.path
         if path.parent != sample_path().parent:
             self.recent.add(path)
 
@@ -157,3 +168,8 @@ class DocumentActions:
 
     def _forget_after_save(self) -> None:
         self._after_save = None
+
+
+def _vector(array: ArrayLike) -> tuple[float, float, float]:
+    x, y, z = np.asarray(array, np.float64).tolist()
+    return x, y, z

@@ -83,7 +83,7 @@ class FileActions:
 
     def reread(self, layout: str | None) -> None:
         """Read the open file again, as another layout; None recognises it. Asks about an edit that would be lost."""
-        path = self._session.scene.file.path
+        path = self._session.shown_scene.file.path
         self.leave_edit(lambda: self._session.open(path, layout=layout))
 
     def open_edit(self) -> None:
@@ -102,7 +102,7 @@ class FileActions:
 
     def export(self) -> None:
         """Ask where to, and write what is on screen."""
-        scene = self._session.scene
+        scene = self._session.shown_scene
         suggested = folder_to_write(scene.file.path) / f"{scene.file.path.stem}_edited.ply"
         dialog = ExportDialog(self._window, suggested, scene, column_lacks(scene, self._session.bound))
         dialog.accepted.connect(lambda: self._export(dialog))
@@ -115,7 +115,7 @@ class FileActions:
 
     def save_edit(self) -> None:
         """Ask where to, and write the edit as a recipe."""
-        source = self._session.scene.file.path
+        source = self._session.shown_scene.file.path
         dialog = QFileDialog(self._window, "Save the edit", str(folder_to_write(source) / f"{source.stem}_edit.json"))
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.setNameFilter(EDIT_FILTER)
@@ -132,7 +132,7 @@ class FileActions:
 
     def picture(self) -> None:
         """Ask for a size, and write the view as a PNG."""
-        PictureDialog(self._window, self._viewport, self._session.scene.file.path, self._toast).open()
+        PictureDialog(self._window, self._viewport, self._session.shown_scene.file.path, self._toast).open()
 
     def quit(self) -> None:
         """Close the window."""
@@ -145,7 +145,7 @@ class FileActions:
         if not self._documents.would_lose:
             then()
             return
-        scene = self._session.scene
+        scene = self._session.shown_scene
         box = PlainMessageBox(
             QMessageBox.Icon.NoIcon,
             "Save the edit?",
@@ -186,7 +186,7 @@ class FileActions:
 
     def _on_failed(self, title: str, error: Exception) -> None:
         self._after_export = None
-        buttons = {}
+        buttons: dict[str, Callable[[], object]] = {}
         if self._session.state == "failed":
             buttons["Try_again"] = self._session.resume
         if not isinstance(error, (ValueError, OSError, MemoryError)):
@@ -203,7 +203,7 @@ class FileActions:
     # ---------------------------------------------------------------- dialogs
 
     def _ask_to_read(self, title: str, name_filter: str, take: Callable[[Path], None]) -> None:
-        folder = QSettings().value("files/folder", _documents(), type=str)
+        folder = str(QSettings().value("files/folder", _documents(), type=str))
         dialog = QFileDialog(self._window, title, folder)
         dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
         dialog.setNameFilter(name_filter)
@@ -241,7 +241,7 @@ def _documents() -> str:
 
 def folder_to_write(source: Path) -> Path:
     """Folder to write to: the one used last, else the source's unless it is one of the program's own."""
-    used = QSettings().value("files/folder", "", type=str)
+    used = str(QSettings().value("files/folder", "", type=str))
     own = source.parent == sample_path().parent
     folders = [Path(used)] if used else []
     folders += [Path(_documents()), Path.home()] if own else [source.parent]

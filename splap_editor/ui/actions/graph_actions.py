@@ -64,7 +64,7 @@ class GraphActions:
 
     def take_preset(self, name: str = "paper") -> None:
         """Set the options that a preset names, for graph, deformers and splats alike."""
-        edit = self._session.scene.edit
+        edit = self._session.shown_scene.edit
         self._session.change_edit(replace(edit, options=with_preset(edit.options, name)), PRESETS[name].label)
         self._say(PRESETS[name].sentence)
 
@@ -88,14 +88,16 @@ class GraphActions:
 
     def keep_selection(self) -> None:
         """Remember the selection as side A."""
-        self.kept = self._session.scene.selection.copy()
+        self.kept = self._session.shown_scene.selection.copy()
         self._say(f"Side A: {np.count_nonzero(self.kept):,} splats. Select side B, then cut or join.")
         self.kept_changed.emit()
 
     def cut_between(self) -> None:
         """Cut all edges between side A and the selection."""
-        scene = self._session.scene
-        pairs = edges_between(scene.ellipses, scene.surface.graph, self.kept, scene.selection & ~self.kept)
+        scene, kept = self._session.shown_scene, self.kept
+        if kept is None:
+            return
+        pairs = edges_between(scene.ellipses, scene.prepared.graph, kept, scene.selection & ~kept)
         if not pairs:
             self._say("No edge joins side A and the selection.")
             return
@@ -104,9 +106,11 @@ class GraphActions:
 
     def join(self) -> None:
         """Join side A and the selection by their best contacts."""
-        scene = self._session.scene
-        pairs = best_links(scene.ellipses, self._options.epsilon, self.kept, scene.selection)
-        new = [pair for pair in pairs if not has_edge(scene.ellipses, scene.surface.graph, pair)]
+        scene, kept = self._session.shown_scene, self.kept
+        if kept is None:
+            return
+        pairs = best_links(scene.ellipses, self._options.epsilon, kept, scene.selection)
+        new = [pair for pair in pairs if not has_edge(scene.ellipses, scene.prepared.graph, pair)]
         if not new:
             self._say("Their best contacts are joined already." if pairs else "Side A or B has no splat to join.")
             return
@@ -115,9 +119,9 @@ class GraphActions:
 
     def join_fragments(self) -> None:
         """Tie every fragment to what is around it."""
-        scene = self._session.scene
-        pairs, n_left = fragment_links(scene.ellipses, scene.surface.graph, self._options.epsilon)
-        n = len(fragments(scene.surface.graph)) - n_left
+        scene = self._session.shown_scene
+        pairs, n_left = fragment_links(scene.ellipses, scene.prepared.graph, self._options.epsilon)
+        n = len(fragments(scene.prepared.graph)) - n_left
         left = f" {_counted(n_left, 'fragment')} too far away to join." if n_left else ""
         if pairs:
             self._change(with_added(self._options, pairs), "Join fragments")
@@ -129,7 +133,7 @@ class GraphActions:
 
     @property
     def _options(self) -> GraphOptions:
-        return self._session.scene.edit.graph
+        return self._session.shown_scene.edit.graph
 
     def _is_joined(self, edge: tuple[int, int]) -> bool:
         scene = self._session.scene
@@ -139,7 +143,7 @@ class GraphActions:
         self._change(with_cut(self._options, pairs), label)
 
     def _change(self, options: GraphOptions, label: str) -> None:
-        self._session.change_edit(self._session.scene.edit.with_options(options), label)
+        self._session.change_edit(self._session.shown_scene.edit.with_options(options), label)
 
     def _forget(self) -> None:
         self.kept = None

@@ -28,26 +28,26 @@ class HandleActions:
 
     def pin_rest(self) -> None:
         """Hold all that is not selected, as one pin; of what handles hold, these stay the masters."""
-        scene = self._session.scene
+        scene = self._session.shown_scene
         self._session.add_pin(rows_region(scene, np.flatnonzero(~scene.selection)))
 
     def clear_pins(self) -> None:
         """Let go of all pins."""
-        self._session.change_edit(replace(self._session.scene.edit, pins=()), "Clear pins")
+        self._session.change_edit(replace(self._session.shown_scene.edit, pins=()), "Clear pins")
 
     def reset(self) -> None:
         """Put the chosen handles back to rest."""
-        scene = self._session.scene
+        scene = self._session.shown_scene
         self._reset(scene.active_handles, "Reset pose")
 
     def reset_all(self) -> None:
         """Put every handle back to rest."""
-        scene = self._session.scene
+        scene = self._session.shown_scene
         self._reset(tuple(handle.handle_id for handle in scene.edit.handles), "Reset all poses")
 
     def delete(self) -> None:
         """Delete the chosen handles and pins."""
-        scene = self._session.scene
+        scene = self._session.shown_scene
         handles, pins = scene.active_handles, scene.active_pins
         counts = ((len(handles), "handle"), (len(pins), "pin"))
         what = " and ".join(f"{n} {noun}s" if n > 1 else noun for n, noun in counts if n)
@@ -55,12 +55,12 @@ class HandleActions:
 
     def pivot(self, pivot: Pivot) -> None:
         """Choose what handles turn and scale about."""
-        self._session.scene.set_pivot(pivot)
+        self._session.shown_scene.set_pivot(pivot)
 
     def next_pivot(self) -> None:
         """Choose the next of them."""
         pivots = list(Pivot)
-        self.pivot(pivots[(pivots.index(self._session.scene.pivot) + 1) % len(pivots)])
+        self.pivot(pivots[(pivots.index(self._session.shown_scene.pivot) + 1) % len(pivots)])
 
     def local(self, on: bool) -> None:
         """Turn the gizmo with the handle."""
@@ -68,10 +68,10 @@ class HandleActions:
         self._viewport.gizmo_changed()
 
     def _reset(self, handle_ids: tuple[int, ...], label: str) -> None:
-        edit = self._session.scene.edit
+        edit = self._session.shown_scene.edit
         if any(not edit.handle(handle_id).pose.is_identity for handle_id in handle_ids):
             self._session.change_edit(edit.with_poses(dict.fromkeys(handle_ids, Pose())), label)
 
     def _selected_region(self):
-        scene = self._session.scene
+        scene = self._session.shown_scene
         return rows_region(scene, np.flatnonzero(scene.selection))

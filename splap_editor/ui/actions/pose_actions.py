@@ -30,14 +30,14 @@ class PoseActions:
 
     def copy(self) -> None:
         """Remember the poses of the chosen handles."""
-        scene = self._session.scene
+        scene = self._session.shown_scene
         self._copied = tuple(scene.edit.handle(handle_id).pose for handle_id in scene.active_handles)
         n = len(self._copied)
         self._toast.say("Copied the pose." if n == 1 else f"Copied {n} poses.")
 
     def paste(self) -> None:
         """Give the chosen handles the poses copied last."""
-        scene = self._session.scene
+        scene = self._session.shown_scene
         if self._copied:
             self._session.change_edit(pasted_poses(scene.edit, scene.active_handles, self._copied), "Paste pose")
         else:
@@ -60,7 +60,8 @@ class PoseActions:
         if self._symmetry is not None:
             self._mirror(self._symmetry)
             return
-        scene, handle_ids, edit = self._session.scene, self._session.scene.active_handles, self._session.scene.edit
+        scene = self._session.shown_scene
+        handle_ids, edit = scene.active_handles, scene.edit
         centers = scene.ellipses.centers
 
         def done(plane: Plane) -> None:
@@ -75,10 +76,10 @@ class PoseActions:
         self._session.worker.submit(Job("symmetry", "Looking for the symmetry of the object", look, done))
 
     def _mirror_across(self, axis: int) -> None:
-        self._mirror(Plane(object_center(self._session.scene.ellipses.centers), np.eye(3)[axis]))
+        self._mirror(Plane(object_center(self._session.shown_scene.ellipses.centers), np.eye(3)[axis]))
 
     def _mirror(self, plane: Plane) -> None:
-        scene = self._session.scene
+        scene = self._session.shown_scene
         try:
             edit, counterparts = mirrored_handles(scene.edit, scene.active_handles, plane, scene.ellipses)
         except NoMirrorImageError as error:

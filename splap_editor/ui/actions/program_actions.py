@@ -26,7 +26,7 @@ class ProgramActions:
     def __init__(self, window: QWidget, store: PreferenceStore) -> None:
         self._window = window
         self.store = store
-        self.actions: ActionSet | None = None
+        self.actions: ActionSet
         """Set once they are made: they need this object first."""
 
     def palette(self) -> None:

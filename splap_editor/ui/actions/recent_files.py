@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import cast
 
 from PySide6.QtCore import QSettings
 from PySide6.QtWidgets import QMenu, QWidget
@@ -28,7 +29,7 @@ class RecentFiles(QMenu):
     @property
     def paths(self) -> list[Path]:
         """The files, the newest first; some may be gone by now."""
-        return [Path(name) for name in QSettings().value("files/recent", [], type=list)]
+        return [Path(name) for name in cast("list[str]", QSettings().value("files/recent", [], type=list))]
 
     def add(self, path: Path) -> None:
         """Make a file the newest."""

@@ -20,7 +20,7 @@ class SelectActions:
 
     @property
     def _scene(self) -> Scene:
-        return self._session.scene
+        return self._session.shown_scene
 
     def all(self) -> None:
         """Select every splat that is not hidden."""
@@ -37,17 +37,17 @@ class SelectActions:
     def grow(self) -> None:
         """Add the neighbours on the surface."""
         scene = self._scene
-        self._select(grown_selection(scene.selection, scene.ellipses, scene.surface.graph), "Grow selection")
+        self._select(grown_selection(scene.selection, scene.ellipses, scene.prepared.graph), "Grow selection")
 
     def shrink(self) -> None:
         """Drop the rim."""
         scene = self._scene
-        self._select(shrunk_selection(scene.selection, scene.ellipses, scene.surface.graph), "Shrink selection")
+        self._select(shrunk_selection(scene.selection, scene.ellipses, scene.prepared.graph), "Shrink selection")
 
     def connected(self) -> None:
         """Select all that hangs together with the selection."""
         scene = self._scene
-        self._select(connected_selection(scene.selection, scene.ellipses, scene.surface.graph), "Select connected")
+        self._select(connected_selection(scene.selection, scene.ellipses, scene.prepared.graph), "Select connected")
 
     def hide(self) -> None:
         """Hide the selected splats."""

@@ -30,7 +30,7 @@ class SelectionSetsMenu(QMenu):
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.setWindowTitle("Keep selection")
         dialog.setLabelText("Name")
-        dialog.setTextValue(f"Selection {len(self._session.scene.selection_sets) + 1}")
+        dialog.setTextValue(f"Selection {len(self._session.shown_scene.selection_sets) + 1}")
         dialog.textValueSelected.connect(self.keep_as)
         dialog.open()
 
@@ -38,23 +38,23 @@ class SelectionSetsMenu(QMenu):
         """Keep the selection under a name, over the one that had it."""
         name = name.strip()
         if name:
-            scene = self._session.scene
+            scene = self._session.shown_scene
             self._change({**scene.selection_sets, name: scene.selection}, "Keep selection")
 
     def select(self, name: str) -> None:
         """Select what was kept under a name."""
-        self._session.change_mask("selection", self._session.scene.selection_sets[name].copy(), f"Select {name}")
+        self._session.change_mask("selection", self._session.shown_scene.selection_sets[name].copy(), f"Select {name}")
 
     def forget(self, name: str) -> None:
         """Keep it no longer."""
-        kept = self._session.scene.selection_sets
+        kept = self._session.shown_scene.selection_sets
         self._change({other: mask for other, mask in kept.items() if other != name}, "Forget selection")
 
     def _change(self, sets: dict, label: str) -> None:
-        self._session.history.push(ChangeSelectionSets(self._session.scene, sets, label))
+        self._session.history.push(ChangeSelectionSets(self._session.shown_scene, sets, label))
 
     def _fill(self) -> None:
-        names = list(self._session.scene.selection_sets)
+        names = list(self._session.shown_scene.selection_sets)
         self.clear()
         self._forget_menu.clear()
         for name in names:

@@ -3,6 +3,7 @@
 from bisect import bisect_left, bisect_right
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QWidget
@@ -47,7 +48,7 @@ class TimelineActions(QObject):
 
     @property
     def _edit(self) -> Edit:
-        return self._session.scene.edit
+        return self._session.shown_scene.edit
 
     def show(self, on: bool) -> None:
         """Show or hide the strip."""
@@ -62,12 +63,12 @@ class TimelineActions(QObject):
     def scrub(self, frame: int) -> None:
         """Show a frame while the line is dragged."""
         self.player.stop()
-        self._session.scene.set_preview(edit_at_frame(self._edit, frame))
+        self._session.shown_scene.set_preview(edit_at_frame(self._edit, frame))
 
     def go_to(self, frame: int) -> None:
         """Show a frame, and stay there."""
         self.player.stop()
-        scene = self._session.scene
+        scene = self._session.shown_scene
         if frame != scene.edit.timeline.frame or scene.preview is not None:
             scene.set_edit(edit_at_frame(scene.edit, frame))
 
@@ -118,7 +119,7 @@ class TimelineActions(QObject):
         """Move a key to another frame."""
         self._change(self._edit.timeline.with_key_moved(frame, to), "Move key")
 
-    def change(self, label: str, **values: object) -> None:
+    def change(self, label: str, **values: Any) -> None:
         """Change length, speed or interpolation."""
         timeline = replace(self._edit.timeline, **values)
         if timeline != self._edit.timeline:
@@ -135,7 +136,7 @@ class TimelineActions(QObject):
     def export(self) -> None:
         """Ask for a range, and write frames or pictures."""
         self.player.stop()
-        scene, projection = self._session.scene, self._viewport.projection
+        scene, projection = self._session.shown_scene, self._viewport.projection
         size = projection.width, projection.height
         FramesDialog(self._window, scene.file.path, scene.edit.timeline, size, self.export_frames).open()
 

@@ -4,6 +4,7 @@ import numpy as np
 from PySide6.QtCore import QObject, QVariantAnimation
 from PySide6.QtWidgets import QWidget
 
+from splap_editor.core.index_spaces import FileRows
 from splap_editor.session.session import Session
 from splap_editor.viewport.camera import View, blended, scene_axes
 from splap_editor.viewport.scene_view import SceneView
@@ -46,6 +47,8 @@ class ViewActions(QObject):
         self._flight.start()
 
     def _on_flown(self, share: float) -> None:
+        if self._ends is None:
+            return
         start, end = self._ends
         # Slow at the end: the eye finds its place again.
         self._viewport.camera.view = blended(start, end, 1.0 - (1.0 - share) ** 3)
@@ -53,8 +56,8 @@ class ViewActions(QObject):
 
     def frame_selection(self) -> None:
         """Fly to the selection, else to the chosen handles and pins, else to the main subject."""
-        scene = self._session.scene
-        rows = np.flatnonzero(scene.selection & ~scene.hidden)
+        scene = self._session.shown_scene
+        rows: FileRows = np.flatnonzero(scene.selection & ~scene.hidden)
         if not len(rows):
             held = (self._view.rows_of_handles(scene.active_handles), self._view.rows_of_pins(scene.active_pins))
             rows = np.concatenate(held)
@@ -69,17 +72,19 @@ class ViewActions(QObject):
 
     def home(self) -> None:
         """Fly to where the main subject fills the picture; after the pose that is on its way, if one is, once more."""
-        self.fly_to(self._viewport.frame())
+        end = self._viewport.frame()
+        self.fly_to(end)
         if self._session.state not in ("ready", "settled"):
-            self._frame_again = self._ends[1]
+            self._frame_again = end
 
     def _on_state_changed(self) -> None:
         if self._frame_again is None or self._session.state not in ("ready", "settled"):
             return
         asked, self._frame_again = self._frame_again, None
         is_flying = self._flight.state() == QVariantAnimation.State.Running
+        flown_to = self._ends[1] if self._ends is not None and is_flying else None
         # Who has moved the camera since is not carried off.
-        if (is_flying and self._ends[1] is asked) or self._viewport.camera.view.is_near(asked):
+        if flown_to is asked or self._viewport.camera.view.is_near(asked):
             self.fly_to(self._viewport.frame())
 
     def front(self) -> None:

@@ -1,8 +1,9 @@
 """Every action by name: type some letters, press Enter."""
 
 from collections.abc import Sequence
+from typing import Any
 
-from PySide6.QtCore import QEvent, QModelIndex, QObject, QRect, QSettings, QSize, Qt
+from PySide6.QtCore import QEvent, QModelIndex, QObject, QPersistentModelIndex, QRect, QSettings, QSize, Qt
 from PySide6.QtGui import QColor, QKeyEvent, QPainter
 from PySide6.QtWidgets import (
     QDialog,
@@ -24,6 +25,7 @@ from splap_editor.ui.theme import FAINT, QUIET, RAISED, STEP, TEXT
 WIDTH, ROW_PX, MOST_ROWS = 520, 30, 12
 N_RECENT = 20
 KEY = "palette/recent"
+_STEPS: dict[int, int] = {Qt.Key.Key_Down: 1, Qt.Key.Key_Up: -1, Qt.Key.Key_PageDown: 10, Qt.Key.Key_PageUp: -10}
 ID, PLACE, KEYS, ENABLED = (Qt.ItemDataRole.UserRole + k for k in range(4))
 
 
@@ -104,9 +106,9 @@ class ActionPalette(QDialog):
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Let the arrow keys move the mark while the line has the keyboard."""
-        if event.type() != QEvent.Type.KeyPress:
+        if not isinstance(event, QKeyEvent) or event.type() != QEvent.Type.KeyPress:
             return False
-        step = {Qt.Key.Key_Down: 1, Qt.Key.Key_Up: -1, Qt.Key.Key_PageDown: 10, Qt.Key.Key_PageUp: -10}.get(event.key())
+        step = _STEPS.get(event.key())
         if step is not None and self.list.count():
             far = abs(step) > 1
             row = self.list.currentRow() + step
@@ -153,11 +155,13 @@ class ActionPalette(QDialog):
 class _Row(QStyledItemDelegate):
     """Name, the menu it is in, and its keys at the right."""
 
-    def sizeHint(self, option: QStyleOptionViewItem, index: QModelIndex) -> QSize:
+    def sizeHint(self, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex) -> QSize:
         """All rows are as high."""
         return QSize(WIDTH - 8 * STEP, ROW_PX)
 
-    def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: QModelIndex) -> None:
+    def paint(
+        self, painter: QPainter, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex
+    ) -> None:
         """Paint one action; one that cannot be used is grey."""
         painter.save()
         if option.state & (QStyle.StateFlag.State_Selected | QStyle.StateFlag.State_MouseOver):
@@ -180,7 +184,7 @@ class _Row(QStyledItemDelegate):
 
 def recent_actions() -> list[str]:
     """Ids run from the palette lately, newest first."""
-    held = QSettings().value(KEY, [])
+    held: Any = QSettings().value(KEY, [])
     return [held] if isinstance(held, str) else [str(action_id) for action_id in held or []]
 
 

@@ -77,7 +77,7 @@ class PictureDialog(QDialog):
 
     def _on_accepted(self) -> None:
         pictures = QStandardPaths.writableLocation(QStandardPaths.StandardLocation.PicturesLocation)
-        folder = Path(QSettings().value("files/pictures", pictures, type=str))
+        folder = Path(str(QSettings().value("files/pictures", pictures, type=str)))
         dialog = QFileDialog(self.parentWidget(), "Save picture", str(folder / f"{self._source.stem}.png"))
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
@@ -96,7 +96,7 @@ class PictureDialog(QDialog):
             self._toast.fail(f"The picture was not saved: {error}")
             return
         image = QImage(pixels.data, width, height, 4 * width, QImage.Format.Format_RGBA8888)
-        if image.save(str(path), "PNG"):
+        if image.save(str(path), "PNG"):  # type: ignore[call-overload] # the stub wants bytes, which PySide refuses
             self._toast.say(f"Saved the picture as {path.name}.")
         else:
             self._toast.fail(f"{path.name} could not be written; is the disk full or the folder protected?")

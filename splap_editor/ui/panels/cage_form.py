@@ -32,7 +32,8 @@ class CageForm(QWidget):
         self.grip.setMinimumWidth(LABEL_PX)
         self.grip.moved.connect(self._on_scrubbed)
         self.grip.finished.connect(lambda: self.changed.emit(self.radius.value()))
-        self.whole = QCheckBox("Reaches the whole object", toolTip="No cage: the weight fades over all of it.")
+        self.whole = QCheckBox("Reaches the whole object")
+        self.whole.setToolTip("No cage: the weight fades over all of it.")
         self.whole.clicked.connect(lambda on: self.changed.emit(None if on else CageOptions.cage_radius))
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
@@ -49,7 +50,8 @@ class CageForm(QWidget):
         self.whole.setChecked(radius is None)
         for part in (self.grip, self.radius):
             part.setEnabled(radius is not None)
-        self.radius.show_value(world_length(CageOptions.cage_radius if radius is None else radius, unit))
+        usual = world_length(CageOptions.cage_radius, unit) or 0.0
+        self.radius.show_value(usual if radius is None else radius)
 
     def _on_scrubbed(self, radius: float) -> None:
         self.radius.show_value(radius)

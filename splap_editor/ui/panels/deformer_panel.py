@@ -1,6 +1,7 @@
 """Which deformer bends the splats, its options, and how far it is."""
 
 from dataclasses import replace
+from typing import Any
 
 from PySide6.QtCore import QEvent, QObject, Qt, Signal
 from PySide6.QtWidgets import QCheckBox, QGridLayout, QVBoxLayout, QWidget
@@ -52,9 +53,8 @@ class DeformerPanel(QWidget):
         self.forms = {group: self._form(group, edit) for group in dict.fromkeys(row.options for row in DEFORMERS)}
         self.kernels = self._form(AdaptationOptions, edit)
         self.weights = WeightsForm(session)
-        self.whole = QCheckBox(
-            "Bend the whole object", toolTip="Otherwise only what lies within the free radius moves."
-        )
+        self.whole = QCheckBox("Bend the whole object")
+        self.whole.setToolTip("Otherwise only what lies within the free radius moves.")
         self.whole.clicked.connect(self._on_whole_clicked)
         self.free_radius = NumberField(0.0, 1e9, decimals=4, step=0.05)
         self.free_radius.setToolTip(_REACH.sentence)
@@ -106,8 +106,8 @@ class DeformerPanel(QWidget):
         bound, scene = self._session.bound, self._scene
         if bound is None:
             return []
-        if bound.edit.deformer.has_weights:
-            return weight_figures(bound.edit, bound.deformer.report)
+        if bound.weighted is not None:
+            return weight_figures(bound.edit, bound.weighted.report)
         deformation = scene.deformation if scene is not None else None
         if deformation is None or not deformation.n_iterations:
             return []
@@ -168,6 +168,6 @@ class DeformerPanel(QWidget):
         if self._scene is not None:
             self._session.change_edit(self._scene.edit.with_options(group), f"Change {what.lower()}")
 
-    def _change(self, label: str, **values: object) -> None:
+    def _change(self, label: str, **values: Any) -> None:
         if self._scene is not None:
             self._session.change_edit(replace(self._scene.edit, **values), label)

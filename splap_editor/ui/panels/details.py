@@ -19,7 +19,9 @@ class Details(QWidget):
 
     def __init__(self, *lines: QWidget, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.header = QToolButton(text="Details", checkable=True)
+        self.header = QToolButton()
+        self.header.setText("Details")
+        self.header.setCheckable(True)
         self.header.setObjectName("detailsHeader")
         self.header.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
         self.header.setIconSize(QSize(12, 12))
@@ -35,7 +37,7 @@ class Details(QWidget):
         layout.setSpacing(STEP)
         layout.addWidget(self.header)
         layout.addWidget(self.body)
-        is_open = QSettings().value(_KEY, False, type=bool)
+        is_open = bool(QSettings().value(_KEY, False, type=bool))
         self.header.setChecked(is_open)
         self._unfold(is_open)
         self.header.toggled.connect(self._on_toggled)

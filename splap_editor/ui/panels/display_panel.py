@@ -53,7 +53,9 @@ class DisplayPanel(QWidget):
         self.sliders: dict[str, QSlider] = {}
         self.fields: dict[str, NumberField] = {}
         for row, (name, (text, low, high, decimals, tip)) in enumerate(SLIDERS.items()):
-            slider = Slider(Qt.Orientation.Horizontal, minimum=round(low * 100), maximum=round(high * 100), toolTip=tip)
+            slider = Slider(Qt.Orientation.Horizontal)
+            slider.setRange(round(low * 100), round(high * 100))
+            slider.setToolTip(tip)
             slider.setFocusPolicy(Qt.FocusPolicy.NoFocus)
             field = NumberField(low, high, decimals=decimals, step=0.05)
             field.setFixedWidth(56)

@@ -74,7 +74,8 @@ class GraphPanel(QWidget):
         self.revert = QPushButton("Revert")
         self.revert.setFlat(True)
         self.revert.clicked.connect(self._on_reverted)
-        self.components = QListWidget(toolTip="Components by size; click one to look at it")
+        self.components = QListWidget()
+        self.components.setToolTip("Components by size; click one to look at it")
         self.components.setFixedHeight(96)
         self.components.itemClicked.connect(
             lambda item: self.component_chosen.emit(self._rows_of(item.data(Qt.ItemDataRole.UserRole)))
@@ -182,8 +183,9 @@ class GraphPanel(QWidget):
         self.components.setVisible(len(sizes) > 1)
 
     def _rows_of(self, label: int) -> np.ndarray:
-        scene = self._session.scene
-        return scene.ellipses.rows[self._graph.components == label]
+        scene = self._session.shown_scene
+        graph = self._graph
+        return scene.ellipses.rows[graph.components == label] if graph is not None else np.empty(0, np.int64)
 
     def _show_mends(self) -> None:
         scene = self._session.scene
@@ -201,8 +203,9 @@ class GraphPanel(QWidget):
 
     def _wanted_options(self) -> GraphOptions:
         """What Apply would put in force: mends made meanwhile stay."""
-        held = self._session.scene.edit.graph
-        return replace(self._wanted, cut=held.cut, add=held.add, separate=held.separate, join=held.join)
+        held = self._session.shown_scene.edit.graph
+        wanted = held if self._wanted is None else self._wanted
+        return replace(wanted, cut=held.cut, add=held.add, separate=held.separate, join=held.join)
 
     def _on_rule_changed(self, wanted: GraphOptions) -> None:
         if self._session.scene is None:
@@ -214,7 +217,7 @@ class GraphPanel(QWidget):
 
     def _on_applied(self) -> None:
         options, self._wanted = self._wanted_options(), None
-        self._session.change_edit(self._session.scene.edit.with_options(options), "Change graph")
+        self._session.change_edit(self._session.shown_scene.edit.with_options(options), "Change graph")
 
     def _on_reverted(self) -> None:
         self._wanted = None

@@ -76,7 +76,8 @@ class NameField(QLineEdit):
     """A name that is edited in place; a click chooses its row too, and with Shift or Ctrl does no more than that."""
 
     def __init__(self, row: ListRow) -> None:
-        super().__init__(toolTip="Rename")
+        super().__init__()
+        self.setToolTip("Rename")
         self.setObjectName("nameField")
         self._row = row
 
@@ -96,10 +97,12 @@ class HandleRow(ListRow):
         super().__init__(panel)
         self._id = handle_id
         self._color = ""
-        self.swatch = QToolButton(toolTip="Colour", autoRaise=True)
+        self.swatch = QToolButton(autoRaise=True)
+        self.swatch.setToolTip("Colour")
         self.swatch.setFixedSize(20, 20)
         self.swatch.clicked.connect(self._on_swatch_clicked)
-        self.is_enabled = QCheckBox(toolTip="A switched-off handle neither moves nor holds anything")
+        self.is_enabled = QCheckBox()
+        self.is_enabled.setToolTip("A switched-off handle neither moves nor holds anything")
         self.is_enabled.clicked.connect(lambda on: panel.change_handle(self._id, "Switch handle", enabled=on))
         self.reset = tool_button("reset", "Put it back to rest")
         self.reset.clicked.connect(lambda: panel.change_handle(self._id, "Reset pose", pose=Pose()))
@@ -139,7 +142,8 @@ class PinRow(ListRow):
         super().__init__(panel)
         self._id = pin_id
         # As wide as a handle's switch and swatch: names stand under names.
-        self._mark = QToolButton(autoRaise=True, toolTip="Pin: stays where it is")
+        self._mark = QToolButton(autoRaise=True)
+        self._mark.setToolTip("Pin: stays where it is")
         self._mark.setFixedSize(20, 20)
         self._mark.setStyleSheet(swatch_style(PIN_COLOR, "0px"))
         self._mark.clicked.connect(lambda: self.choose(add=False))
@@ -176,4 +180,8 @@ def swatch_style(color: str, radius: str) -> str:
 
 def tool_button(name: str, tip: str) -> QToolButton:
     """Small button with an icon."""
-    return QToolButton(icon=icon(name), toolTip=tip, autoRaise=True, iconSize=QSize(16, 16))
+    button = QToolButton(autoRaise=True)
+    button.setIcon(icon(name))
+    button.setIconSize(QSize(16, 16))
+    button.setToolTip(tip)
+    return button

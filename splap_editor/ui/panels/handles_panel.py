@@ -1,6 +1,7 @@
 """The list of handles and pins, and the numbers of the chosen one."""
 
 from dataclasses import replace
+from typing import Any
 
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QFrame, QGridLayout, QScrollArea, QVBoxLayout, QWidget
@@ -54,7 +55,7 @@ class HandlesPanel(QWidget):
         self.pivot = Choice(toolTip="What several handles turn and scale about; Shift + right click places the point.")
         for pivot, words in PIVOTS.items():
             self.pivot.addItem(words, pivot)
-        self.pivot.activated.connect(lambda index: self._scene and self._scene.set_pivot(self.pivot.itemData(index)))
+        self.pivot.activated.connect(self._on_pivot_chosen)
         self.pin_reach = NumberField(1e-6, 1e9, decimals=4, step=0.01)
         self.pin_reach.setToolTip("Radius on the surface of what the chosen pin holds.")
         self.pin_reach.committed.connect(self._on_reach_changed)
@@ -126,7 +127,7 @@ class HandlesPanel(QWidget):
         """Count what a pin holds, once for each region it has."""
         region, n = self._counted.get(pin.pin_id, (None, 0))
         if region is not pin.region:
-            n = len(region_nodes(pin.region, self._scene.ellipses))
+            n = len(region_nodes(pin.region, self._session.shown_scene.ellipses))
             self._counted[pin.pin_id] = (pin.region, n)
         return n
 
@@ -159,17 +160,23 @@ class HandlesPanel(QWidget):
             self.cage_form.show_radius(world_length(CageOptions.cage_radius, unit), unit)
 
     def _show_pivot(self) -> None:
-        self.pivot.setCurrentIndex(list(PIVOTS).index(self._scene.pivot))
+        self.pivot.setCurrentIndex(list(PIVOTS).index(self._session.shown_scene.pivot))
+
+    def _on_pivot_chosen(self, index: int) -> None:
+        if self._scene is not None:
+            self._scene.set_pivot(self.pivot.itemData(index))
 
     def _chosen(self) -> Handle | None:
         # The active ones may for a moment name a handle that an undo has just taken away.
         wanted = self._scene.active_handle if self._scene is not None else None
-        handles = self._scene.shown_edit.handles if wanted is not None else ()
+        handles = self._scene.shown_edit.handles if self._scene is not None else ()
         return next((handle for handle in handles if handle.handle_id == wanted), None)
 
     def _chosen_pin(self) -> Pin | None:
-        chosen = self._scene.active_pins if self._scene is not None else ()
-        return next((pin for pin in self._scene.edit.pins if pin.pin_id == chosen[-1]), None) if chosen else None
+        scene = self._scene
+        if scene is None or not scene.active_pins:
+            return None
+        return next((pin for pin in scene.edit.pins if pin.pin_id == scene.active_pins[-1]), None)
 
     def _build_rows(self, handle_ids: list[int], pin_ids: list[int]) -> None:
         known = {*self.handle_rows}, {*self.pin_rows}
@@ -183,7 +190,7 @@ class HandlesPanel(QWidget):
         made: list[ListRow] = [*self.handle_rows.values(), *self.pin_rows.values()]
         for place, row in enumerate(made):
             self._lines.insertWidget(place, row)
-        new = [self.handle_rows[each] for each in handle_ids if each not in known[0]]
+        new: list[ListRow] = [self.handle_rows[each] for each in handle_ids if each not in known[0]]
         new += [self.pin_rows[each] for each in pin_ids if each not in known[1]]
         if len(new) == 1:
             # Once it has its place.
@@ -193,46 +200,50 @@ class HandlesPanel(QWidget):
 
     def choose_handle(self, handle_id: int, *, add: bool) -> None:
         """Make a handle the active one, or one more of the chosen, or one less."""
+        scene = self._session.shown_scene
         if add:
-            self._scene.set_active_handles(toggled(self._scene.active_handles, handle_id), self._scene.active_pins)
+            scene.set_active_handles(toggled(scene.active_handles, handle_id), scene.active_pins)
         else:
-            self._scene.set_active_handles((handle_id,))
+            scene.set_active_handles((handle_id,))
 
     def choose_pin(self, pin_id: int, *, add: bool) -> None:
         """Choose a pin alone, or as one more, or one less."""
+        scene = self._session.shown_scene
         if add:
-            self._scene.set_active_handles(self._scene.active_handles, toggled(self._scene.active_pins, pin_id))
+            scene.set_active_handles(scene.active_handles, toggled(scene.active_pins, pin_id))
         else:
-            self._scene.set_active_handles((), (pin_id,))
+            scene.set_active_handles((), (pin_id,))
 
-    def change_handle(self, handle_id: int, label: str, **values: object) -> None:
+    def change_handle(self, handle_id: int, label: str, **values: Any) -> None:
         """Change fields of a handle as one undoable step."""
-        handle = self._scene.edit.handle(handle_id)
+        edit = self._session.shown_scene.edit
+        handle = edit.handle(handle_id)
         if any(getattr(handle, name) != value for name, value in values.items()):
-            self._session.change_edit(self._scene.edit.with_handle(replace(handle, **values)), label)
+            self._session.change_edit(edit.with_handle(replace(handle, **values)), label)
 
-    def change_pin(self, pin_id: int, label: str, **values: object) -> None:
+    def change_pin(self, pin_id: int, label: str, **values: Any) -> None:
         """Change fields of a pin as one undoable step."""
-        pin = self._scene.edit.pin(pin_id)
+        edit = self._session.shown_scene.edit
+        pin = edit.pin(pin_id)
         if any(getattr(pin, name) != value for name, value in values.items()):
-            self._session.change_edit(self._scene.edit.with_pin(replace(pin, **values)), label)
+            self._session.change_edit(edit.with_pin(replace(pin, **values)), label)
 
     def delete_handle(self, handle_id: int) -> None:
         """Delete a handle as one undoable step."""
-        self._session.change_edit(self._scene.edit.without_handles((handle_id,)), "Delete handle")
+        self._session.change_edit(self._session.shown_scene.edit.without_handles((handle_id,)), "Delete handle")
 
     def delete_pin(self, pin_id: int) -> None:
         """Delete a pin as one undoable step."""
-        self._session.change_edit(self._scene.edit.without_pins((pin_id,)), "Delete pin")
+        self._session.change_edit(self._session.shown_scene.edit.without_pins((pin_id,)), "Delete pin")
 
     def _preview(self, pose: Pose) -> None:
-        self._session.preview_poses({self._scene.active_handles[-1]: pose})
+        self._session.preview_poses({self._session.shown_scene.active_handles[-1]: pose})
 
     def _on_pose_changed(self, pose: Pose) -> None:
         handle = self._chosen()
         if handle is None:
             return
-        if self._scene.preview is not None:
+        if self._session.shown_scene.preview is not None:
             self._preview(pose)
             self._session.commit_preview("Pose handle")
         else:
@@ -246,5 +257,6 @@ class HandlesPanel(QWidget):
     def _on_reach_changed(self, reach: float) -> None:
         pin = self._chosen_pin()
         if pin is not None and pin.reach is not None and reach != pin.reach:
-            edit = self._scene.edit.with_pin(pin_with_reach(self._scene, pin, reach))
+            scene = self._session.shown_scene
+            edit = scene.edit.with_pin(pin_with_reach(scene, pin, reach))
             self._session.change_edit(edit, "Change reach of pin")

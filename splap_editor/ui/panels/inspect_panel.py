@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QComboBox, QGridLayout, QHBoxLayout, QLabel, QPush
 from splap_editor.core.graph.splat_graph import GraphOptions
 from splap_editor.session.cards import EdgeCard, SplatCard, edge_card, has_edge, splat_card
 from splap_editor.session.graph_preview import GraphPreview
-from splap_editor.session.neighbor_sets import NEIGHBOR_KINDS
+from splap_editor.session.neighbor_sets import NEIGHBOR_KINDS, NeighborComparison
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.ui.theme import STEP
@@ -96,18 +96,19 @@ class InspectPanel(QWidget):
         self.k.setEnabled({options.kind, options.other} - {"graph", ""} != set())
         picked = scene.picked if scene is not None else None
         graph = scene.surface.graph if scene is not None and scene.surface is not None else None
-        self.splat.setText(
-            HINT if picked is None else _splat_text(splat_card(scene.splats, scene.ellipses, graph, picked))
-        )
+        text = HINT
+        if scene is not None and picked is not None:
+            text = _splat_text(splat_card(scene.splats, scene.ellipses, graph, picked))
+        self.splat.setText(text)
         both = self._inspected.comparison
         for part in (self._sets, self.counts):
             part.setVisible(picked is not None and both is not None)
         if both is not None:
-            self.counts.setText(self._counts_text())
+            self.counts.setText(self._counts_text(both))
         self._show_edge()
 
-    def _counts_text(self) -> str:
-        both, options = self._inspected.comparison, self._inspected.options
+    def _counts_text(self, both: NeighborComparison) -> str:
+        options = self._inspected.options
         first = f"{_dot(FIRST_COLOR)} {len(both.first)} by {_words(options.kind)}"
         if not options.other:
             return first
@@ -120,10 +121,10 @@ class InspectPanel(QWidget):
 
     def _show_edge(self) -> None:
         scene, rows = self._session.scene, self._inspected.edge
-        is_known = scene is not None and rows is not None and (scene.ellipses.node_of_row[list(rows)] >= 0).all()
-        self._edge_part.setVisible(bool(is_known))
-        if not is_known:
+        if scene is None or rows is None or (scene.ellipses.node_of_row[list(rows)] < 0).any():
+            self._edge_part.setVisible(False)
             return
+        self._edge_part.setVisible(True)
         options = scene.edit.graph
         is_joined = scene.surface is not None and has_edge(scene.ellipses, scene.surface.graph, rows)
         self.edge.setText(_edge_text(edge_card(scene.ellipses, rows, options.epsilon), is_joined))
@@ -137,7 +138,7 @@ class InspectPanel(QWidget):
 
     def _on_epsilon_committed(self, percent: float) -> None:
         self._is_epsilon_typed = True
-        self._preview.ask(_at(self._session.scene.edit.graph, percent / 100.0))
+        self._preview.ask(_at(self._session.shown_scene.edit.graph, percent / 100.0))
         self._show_verdict()
 
     def _show_verdict(self) -> None:

@@ -58,14 +58,20 @@ class LayoutForm(QWidget):
         self.axes.setCurrentIndex(self.axes.findData(-1 if axis is None else axis))
 
     def _choose_layout(self, name: str | None) -> None:
-        layout, file = self._file.layout, self._file
+        file = self._file
+        if file is None:
+            return
+        layout = file.layout
         self.show_file(file)
         is_new = layout.is_chosen if name is None else name != layout.name
         if is_new:
             self.chosen.emit(name)
 
     def _choose_axis(self, axis: int) -> None:
-        layout, file = self._file.layout, self._file
+        file = self._file
+        if file is None:
+            return
+        layout = file.layout
         self.show_file(file)
         wanted = None if axis < 0 else axis
         if wanted != layout.normal_axis:

@@ -33,7 +33,7 @@ class OdditiesList(QWidget):
         SceneFollower(session, self._on_scene_changed)
 
     def _on_scene_changed(self) -> None:
-        scene = self._session.scene
+        scene = self._session.shown_scene
         self._show(scene, None)
         splats, ellipses = scene.splats, scene.ellipses
 

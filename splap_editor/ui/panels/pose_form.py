@@ -1,5 +1,7 @@
 """Numbers of a handle's pose: translation, Euler angles, scale."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PySide6.QtCore import Signal
@@ -42,7 +44,8 @@ def quat_of_euler(degrees: ArrayLike) -> tuple[float, float, float, float]:
             [-sy, sx * cy, cx * cy],
         ]
     )
-    return tuple(float(number) for number in matrices_to_quats(R[None])[0])
+    w, x, y, z = matrices_to_quats(R[None])[0].tolist()
+    return w, x, y, z
 
 
 class PoseForm(QWidget):
@@ -94,7 +97,7 @@ class PoseForm(QWidget):
             self.translate[axis].show_value(pose.translate[axis])
             self.rotate[axis].show_value(self._euler[axis])
         is_uniform = not isinstance(pose.scale, tuple)
-        for axis, value in enumerate([pose.scale] * 3 if is_uniform else pose.scale):
+        for axis, value in enumerate(pose.scale if isinstance(pose.scale, tuple) else (pose.scale,) * 3):
             self.scales[axis].show_value(value)
             self._grips[self.scales[axis]].setVisible(axis == 0 or not is_uniform)
             self.scales[axis].setVisible(axis == 0 or not is_uniform)
@@ -132,13 +135,14 @@ class PoseForm(QWidget):
         if not np.array_equal(angles, shown):
             self._euler = np.where(angles == shown, self._euler, angles)
             rotate = quat_of_euler(self._euler)
-        translate = tuple(_typed(*pair) for pair in zip(self.translate, self._pose.translate, strict=True))
         scale = self._pose.scale
-        if isinstance(scale, tuple):
-            scale = tuple(_typed(*pair) for pair in zip(self.scales, scale, strict=True))
-        else:
-            scale = _typed(self.scales[0], scale)
-        return Pose(translate, rotate, scale)
+        scale = _all_typed(self.scales, scale) if isinstance(scale, tuple) else _typed(self.scales[0], scale)
+        return Pose(_all_typed(self.translate, self._pose.translate), rotate, scale)
+
+
+def _all_typed(fields: Sequence[NumberField], held: tuple[float, float, float]) -> tuple[float, float, float]:
+    x, y, z = (_typed(*pair) for pair in zip(fields, held, strict=True))
+    return x, y, z
 
 
 def _typed(field: NumberField, held: float) -> float:

@@ -3,6 +3,7 @@
 import numpy as np
 from PySide6.QtWidgets import QCheckBox, QComboBox, QGridLayout, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
+from splap_editor.core.index_spaces import FileMask
 from splap_editor.engine.quantities import QUANTITIES
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.selection import SelectionMode, combined_selection
@@ -34,7 +35,8 @@ class QuantityPanel(QWidget):
         for name in COLORMAPS:
             self.colormap.addItem(name.replace("-", " – ").capitalize(), name)
         self.colormap.currentIndexChanged.connect(lambda index: view.set(colormap=self.colormap.itemData(index)))
-        self.log = QCheckBox("Log", toolTip="Equal ratios take equal shares of the colours")
+        self.log = QCheckBox("Log")
+        self.log.setToolTip("Equal ratios take equal shares of the colours")
         self.log.toggled.connect(lambda on: view.set(is_log=on, low=None, high=None))
         self.lack = PlainLabel(wordWrap=True)
         self.lack.setProperty("tone", "quiet")
@@ -47,7 +49,8 @@ class QuantityPanel(QWidget):
         self.low, self.high = self._end("Lowest colour"), self._end("Highest colour")
         self.low.committed.connect(lambda value: view.set(low=value))
         self.high.committed.connect(lambda value: view.set(high=value))
-        self.reset = QPushButton("Auto", toolTip="Leave the ends of the colours to the values")
+        self.reset = QPushButton("Auto")
+        self.reset.setToolTip("Leave the ends of the colours to the values")
         self.reset.setFlat(True)
         self.reset.clicked.connect(self.reset_range)
         for combo in (self.choice, self.colormap):
@@ -81,8 +84,8 @@ class QuantityPanel(QWidget):
         layout = QVBoxLayout(self)
         layout.setSpacing(2 * STEP)
         layout.addLayout(grid)
-        for part in (self.lack, self.histogram, self._ends):
-            layout.addWidget(part)
+        for below in (self.lack, self.histogram, self._ends):
+            layout.addWidget(below)
 
     @staticmethod
     def _end(tip: str) -> NumberField:
@@ -116,22 +119,23 @@ class QuantityPanel(QWidget):
     # Selecting by value -------------------------------------------------------------------------------------------
 
     def _preview(self, low: float, high: float, mode: SelectionMode) -> None:
-        scene = self._session.scene
+        scene = self._session.shown_scene
         if self._before is None:
             self._before = scene.selection
-        scene.set_selection(self._combined(low, high, mode))
+        scene.set_selection(self._combined(self._before, low, high, mode))
 
     def _select(self, low: float, high: float, mode: SelectionMode) -> None:
-        if self._before is None:
-            self._before = self._session.scene.selection
-        selection = self._combined(low, high, mode)
+        before = self._session.shown_scene.selection if self._before is None else self._before
+        selection = self._combined(before, low, high, mode)
         self._drop()
         self._session.change_mask("selection", selection, "Select by value")
 
     def _drop(self) -> None:
         if self._before is not None:
-            self._session.scene.set_selection(self._before)
+            self._session.shown_scene.set_selection(self._before)
             self._before = None
 
-    def _combined(self, low: float, high: float, mode: SelectionMode) -> np.ndarray:
-        return combined_selection(self._before, self._view.shown.within(low, high) & ~self._session.scene.hidden, mode)
+    def _combined(self, before: FileMask, low: float, high: float, mode: SelectionMode) -> FileMask:
+        shown = self._view.shown
+        assert shown is not None  # who picks sees its bars
+        return combined_selection(before, shown.within(low, high) & ~self._session.shown_scene.hidden, mode)

@@ -94,7 +94,7 @@ class ScenePanel(QWidget):
         self._show_surface()
 
     def _show_surface(self) -> None:
-        surface = self._scene.surface
+        surface = self._scene.surface if self._scene is not None else None
         if surface is None:
             self.facts["surface"].setText("not prepared yet")
             return

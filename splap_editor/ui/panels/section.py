@@ -22,7 +22,9 @@ class Section(QFrame):
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
         self._key = f"panels/{title.lower()}"
         self.body = body
-        self.header = QToolButton(text=title, checkable=True)
+        self.header = QToolButton()
+        self.header.setText(title)
+        self.header.setCheckable(True)
         self.header.setObjectName("sectionHeader")
         self.header.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
         self.header.setIconSize(QSize(12, 12))
@@ -34,9 +36,10 @@ class Section(QFrame):
         layout.addWidget(self.header)
         layout.addWidget(body)
         body.setContentsMargins(0, 0, 0, 0)
-        if body.layout() is not None:
-            body.layout().setContentsMargins(3 * STEP, STEP, 3 * STEP, 3 * STEP)
-        is_open = QSettings().value(self._key, True, type=bool)
+        inner = body.layout()
+        if inner is not None:
+            inner.setContentsMargins(3 * STEP, STEP, 3 * STEP, 3 * STEP)
+        is_open = bool(QSettings().value(self._key, True, type=bool))
         self.header.setChecked(is_open)
         self._unfold(is_open)
         self.header.toggled.connect(self._on_toggled)

@@ -44,7 +44,7 @@ class WeightsForm(QWidget):
         bound = self._session.bound
         lines = weight_lines(bound.edit, bound.weighted.report) if bound and bound.weighted else []
         while len(self.labels) < len(lines):
-            label = PlainLabel(wordWrap=True, textInteractionFlags=Qt.TextInteractionFlag.TextSelectableByMouse)
+            label: QLabel = PlainLabel(wordWrap=True, textInteractionFlags=Qt.TextInteractionFlag.TextSelectableByMouse)
             self._lines.addWidget(label)
             self.labels.append(label)
         while len(self.labels) > len(lines):

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
+from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.edit import binds_like
 from splap_editor.engine.frames import FramePoser, frame_path, frame_poser, write_frames, write_pictures
 from splap_editor.io.png import write_png
@@ -71,7 +72,7 @@ def submit_frames(
     failed : callable
         Given what went wrong.
     """
-    scene, bound = session.scene, session.bound
+    scene, bound = session.shown_scene, session.bound
     file, edit, surface, cache = scene.file, scene.edit, scene.surface, session.cache
     n_threads = session.n_threads
     serves = bound is not None and binds_like(bound.edit, edit)
@@ -86,7 +87,7 @@ def submit_frames(
         frames, path = order.frames, order.path
         poses = poser(job)
         progress = job.progress("frames")
-        if order.kind == "ply":
+        if desk is None:
             return write_frames(poses, file, frames, path, as_3dgs=order.as_3dgs, progress=progress)
         if order.kind == "pictures":
             return write_pictures(poses, frames, path, lambda k: desk.picture(job, k), write_png, progress=progress)
@@ -119,7 +120,7 @@ def submit_frames(
 class _Desk:
     """A studio of the main thread, asked for pictures by the worker."""
 
-    def __init__(self, splats, viewport: Viewport, order: FrameOrder, hidden: NDArray[np.bool_]) -> None:
+    def __init__(self, splats: Splats, viewport: Viewport, order: FrameOrder, hidden: NDArray[np.bool_]) -> None:
         self.view = viewport.camera.view
         self.world_up = np.array(viewport.camera.world_up)
         self._is_transparent = order.is_transparent
@@ -133,7 +134,7 @@ class _Desk:
     def picture(self, job: Job, kernels: AdaptedKernels | None, view: View | None = None) -> NDArray[np.uint8]:
         """Pixels of kernels; waits for the main thread, and no longer than until the job is cancelled."""
         is_drawn = threading.Event()
-        result: list[object] = []
+        result: list[NDArray[np.uint8] | Exception] = []
 
         def draw() -> None:
             try:
@@ -145,9 +146,10 @@ class _Desk:
         job.deliver(draw)
         while not is_drawn.wait(POLL_S):
             job.report(job.share)
-        if isinstance(result[0], Exception):
-            raise result[0]
-        return result[0]
+        made = result[0]
+        if isinstance(made, Exception):
+            raise made
+        return made
 
     def close(self) -> None:
         """Let go of the graphics; on the main thread."""

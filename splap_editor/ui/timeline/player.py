@@ -64,13 +64,13 @@ class Player(QObject):
         self._viewport.end_motion()
         scene, shown = self._scene, self._shown
         self._scene = self._shown = None
-        if scene is self._session.scene and shown is not None and scene.preview is shown:
+        if scene is not None and scene is self._session.scene and shown is not None and scene.preview is shown:
             scene.set_edit(edit_at_frame(scene.edit, shown.timeline.frame))
         self.playing_changed.emit(False)
 
     def _on_tick(self) -> None:
         scene = self._scene
-        if scene.preview not in (None, self._shown) or not scene.edit.timeline.keys:
+        if scene is None or scene.preview not in (None, self._shown) or not scene.edit.timeline.keys:
             self.stop()
             return
         begun, first = self._start

@@ -64,7 +64,7 @@ class TimelineStrip(QWidget):
         self.hide()
 
     def _show(self) -> None:
-        timeline = self._session.scene.shown_edit.timeline
+        timeline = self._session.shown_scene.shown_edit.timeline
         self.ruler.show_timeline(timeline)
         self.frame_field.show_value(timeline.frame)
         self.length_field.show_value(timeline.n_frames)

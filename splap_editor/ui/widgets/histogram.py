@@ -53,24 +53,32 @@ class Histogram(QWidget):
     # Places and values --------------------------------------------------------------------------------------------
 
     @property
+    def _drawn(self) -> ShownQuantity:
+        """What is shown, for what is asked only while something is."""
+        assert self._shown is not None
+        return self._shown
+
+    @property
     def _bars(self) -> QRectF:
         return QRectF(HANDLE_PX, 1.0, self.width() - 2 * HANDLE_PX, self.height() - STRIP_PX - 1.0)
 
     def x_of(self, value: float) -> float:
         """Pixel column of a value, inside of the bars."""
-        edges, bars = self._shown.edges, self._bars
+        shown, bars = self._drawn, self._bars
+        edges = shown.edges
         low, high = float(edges[0]), float(edges[-1])
-        if self._shown.is_log:
+        if shown.is_log:
             low, high, value = np.log(low), np.log(high), np.log(max(value, edges[0] * 1e-6))
         return bars.left() + bars.width() * float(np.clip((value - low) / (high - low), 0.0, 1.0))
 
     def value_at(self, x: float) -> float:
         """Value at a pixel column."""
-        edges, bars = self._shown.edges, self._bars
+        shown, bars = self._drawn, self._bars
+        edges = shown.edges
         share = float(np.clip((x - bars.left()) / bars.width(), 0.0, 1.0))
         if share in (0.0, 1.0):
             return float(edges[-1] if share else edges[0])
-        if self._shown.is_log:
+        if shown.is_log:
             return float(edges[0] * (edges[-1] / edges[0]) ** share)
         return float(edges[0] + share * (edges[-1] - edges[0]))
 
@@ -97,7 +105,7 @@ class Histogram(QWidget):
             self.update()
         elif self._dragged:
             value = self.value_at(x)
-            low, high = self._shown.low, self._shown.high
+            low, high = self._drawn.low, self._drawn.high
             low, high = (min(value, high), high) if self._dragged == "low" else (low, max(value, low))
             self.range_changed.emit(low, high)
 
@@ -140,7 +148,7 @@ class Histogram(QWidget):
             self._paint_handles(painter, bars)
 
     def _paint_bars(self, painter: QPainter, bars: QRectF) -> None:
-        shown = self._shown
+        shown = self._drawn
         most = int(shown.counts.max(initial=0))
         if not most:
             return
@@ -155,7 +163,7 @@ class Histogram(QWidget):
 
     def _paint_handles(self, painter: QPainter, bars: QRectF) -> None:
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        low, high = self.x_of(self._shown.low), self.x_of(self._shown.high)
+        low, high = self.x_of(self._drawn.low), self.x_of(self._drawn.high)
         top = bars.bottom() + 2.0
         painter.fillRect(QRectF(bars.left(), top + 4.0, bars.width(), 2.0), QColor(LINE))
         painter.fillRect(QRectF(low, top + 4.0, high - low, 2.0), QColor(FAINT))

@@ -122,7 +122,7 @@ class OptionsForm(QWidget):
                 editor.setChecked(held)
             elif isinstance(editor, QComboBox):
                 editor.setCurrentIndex(max(editor.findData(held), 0))
-            else:
+            elif isinstance(editor, NumberField):
                 editor.show_value(self._hints[name].factor * held)
             editor.blockSignals(False)
             only_for = self._hints[name].only_for
@@ -137,20 +137,21 @@ class OptionsForm(QWidget):
 
     def _editor(self, name: str, hint: FieldHint, value: Any) -> QWidget:
         if hint.choices:
-            editor = Choice()
+            choices = Choice()
             for choice, words in hint.choices.items():
-                editor.addItem(words, choice)
-            editor.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
-            editor.currentIndexChanged.connect(lambda index: self._take(name, editor.itemData(index)))
-        elif isinstance(value, bool):
-            editor = QCheckBox(hint.label)
-            editor.toggled.connect(lambda checked: self._take(name, checked))
-        else:
-            kind = type(value)
-            decimals = 0 if kind is int else hint.decimals
-            editor = NumberField(hint.low, hint.high, decimals=decimals, step=hint.step, unit=hint.unit)
-            editor.committed.connect(lambda number: self._take(name, kind(_round(number / hint.factor))))
-        return editor
+                choices.addItem(words, choice)
+            choices.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+            choices.currentIndexChanged.connect(lambda index: self._take(name, choices.itemData(index)))
+            return choices
+        if isinstance(value, bool):
+            switch = QCheckBox(hint.label)
+            switch.toggled.connect(lambda checked: self._take(name, checked))
+            return switch
+        kind = type(value)
+        decimals = 0 if kind is int else hint.decimals
+        field = NumberField(hint.low, hint.high, decimals=decimals, step=hint.step, unit=hint.unit)
+        field.committed.connect(lambda number: self._take(name, kind(_round(number / hint.factor))))
+        return field
 
     def _take(self, name: str, held: Any) -> None:
         if getattr(self._value, name) != held:

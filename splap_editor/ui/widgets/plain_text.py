@@ -6,6 +6,7 @@ else, so that no text is ever taken for more than text.
 """
 
 import html
+from typing import Any
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QResizeEvent
@@ -16,7 +17,7 @@ from PySide6.QtWidgets import QLabel, QListWidgetItem, QMessageBox, QWidget
 class PlainLabel(QLabel):
     """A label that shows its text as it is, and all lines of it."""
 
-    def __init__(self, *arguments: object, **properties: object) -> None:
+    def __init__(self, *arguments: Any, **properties: Any) -> None:
         super().__init__(*arguments, **properties)
         self.setTextFormat(Qt.TextFormat.PlainText)
 
@@ -39,7 +40,7 @@ class PlainLabel(QLabel):
 class PlainMessageBox(QMessageBox):
     """A message box that shows its texts as they are."""
 
-    def __init__(self, *arguments: object, **properties: object) -> None:
+    def __init__(self, *arguments: Any, **properties: Any) -> None:
         super().__init__(*arguments, **properties)
         self.setTextFormat(Qt.TextFormat.PlainText)
 

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QWidget
 from splap_editor.ui.theme import STEP
 from splap_editor.ui.widgets.overlay import SHADE
 from splap_editor.viewport.colormaps import UNDEFINED, label_colors
-from splap_editor.viewport.quantity_view import QuantityView, value_text
+from splap_editor.viewport.quantity_view import QuantityView, ShownQuantity, value_text
 
 BAR_PX = 200
 BAR_HEIGHT_PX = 10
@@ -54,26 +54,13 @@ class QuantityLegend(QWidget):
         self.update()
 
     def _place(self) -> None:
-        if not self.title:
+        shown = self._view.shown
+        if not self.title or shown is None:
             return
         line = QFontMetricsF(self.font()).lineSpacing()
-        n_lines = 1 + (len(self._labels()) if self._view.shown.quantity.is_label else 1)
-        height = n_lines * line + 5 * STEP + (0 if self._view.shown.quantity.is_label else BAR_HEIGHT_PX)
+        n_lines = 1 + (len(_labels(shown)) if shown.quantity.is_label else 1)
+        height = n_lines * line + 5 * STEP + (0 if shown.quantity.is_label else BAR_HEIGHT_PX)
         self.setGeometry(3 * STEP, 3 * STEP, BAR_PX + 6 * STEP, round(height))
-
-    def _labels(self) -> list[tuple[str, tuple[int, ...]]]:
-        """Words and colours of the commonest labels."""
-        shown = self._view.shown
-        known = shown.values[np.isfinite(shown.values)].astype(np.int64)
-        counts = np.bincount(known) if known.size else np.zeros(0, np.int64)
-        wanted = [k for k in range(len(counts)) if counts[k]][:MOST_LABELS]
-        colors = label_colors(np.array(wanted, np.float64))
-        lines = [
-            (f"{value_text(shown.quantity, float(k))}: {counts[k]:,} splats", tuple(color))
-            for k, color in zip(wanted, colors.tolist(), strict=True)
-        ]
-        n_more = int(np.count_nonzero(counts)) - len(wanted)
-        return lines + ([(f"and {n_more:,} more", UNDEFINED)] if n_more else [])
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Paint title, colours and ends."""
@@ -91,23 +78,37 @@ class QuantityLegend(QWidget):
         painter.drawText(QRectF(left, top, BAR_PX, line), self.title)
         top += line + STEP
         if shown.quantity.is_label:
-            for text, color in self._labels():
+            for text, color in _labels(shown):
                 painter.fillRect(QRectF(left, top + 0.25 * line, 0.5 * line, 0.5 * line), QColor(*color))
                 painter.drawText(QRectF(left + line, top, BAR_PX, line), text)
                 top += line
         else:
-            self._paint_bar(painter, left, top, line)
+            _paint_bar(painter, shown, left, top, line)
 
-    def _paint_bar(self, painter: QPainter, left: float, top: float, line: float) -> None:
-        shown = self._view.shown
-        places = (np.arange(BAR_PX) + 0.5) / BAR_PX
-        if shown.is_log:
-            values = shown.low * (shown.high / shown.low) ** places
-        else:
-            values = shown.low + places * (shown.high - shown.low)
-        for k, color in enumerate(shown.colors(values).tolist()):
-            painter.fillRect(QRectF(left + k, top, 1.0, BAR_HEIGHT_PX), QColor(*color))
-        row = QRectF(left, top + BAR_HEIGHT_PX + 2.0, BAR_PX, line)
-        ends = (shown.low, Qt.AlignmentFlag.AlignLeft), (shown.high, Qt.AlignmentFlag.AlignRight)
-        for value, side in ends:
-            painter.drawText(row, side | Qt.AlignmentFlag.AlignTop, value_text(shown.quantity, value))
+
+def _labels(shown: ShownQuantity) -> list[tuple[str, tuple[int, ...]]]:
+    """Words and colours of the commonest labels."""
+    known = shown.values[np.isfinite(shown.values)].astype(np.int64)
+    counts = np.bincount(known) if known.size else np.zeros(0, np.int64)
+    wanted = [k for k in range(len(counts)) if counts[k]][:MOST_LABELS]
+    colors = label_colors(np.array(wanted, np.float64))
+    lines = [
+        (f"{value_text(shown.quantity, float(k))}: {counts[k]:,} splats", tuple(color))
+        for k, color in zip(wanted, colors.tolist(), strict=True)
+    ]
+    n_more = int(np.count_nonzero(counts)) - len(wanted)
+    return lines + ([(f"and {n_more:,} more", UNDEFINED)] if n_more else [])
+
+
+def _paint_bar(painter: QPainter, shown: ShownQuantity, left: float, top: float, line: float) -> None:
+    places = (np.arange(BAR_PX) + 0.5) / BAR_PX
+    if shown.is_log:
+        values = shown.low * (shown.high / shown.low) ** places
+    else:
+        values = shown.low + places * (shown.high - shown.low)
+    for k, color in enumerate(shown.colors(values).tolist()):
+        painter.fillRect(QRectF(left + k, top, 1.0, BAR_HEIGHT_PX), QColor(*color))
+    row = QRectF(left, top + BAR_HEIGHT_PX + 2.0, BAR_PX, line)
+    ends = (shown.low, Qt.AlignmentFlag.AlignLeft), (shown.high, Qt.AlignmentFlag.AlignRight)
+    for value, side in ends:
+        painter.drawText(row, side | Qt.AlignmentFlag.AlignTop, value_text(shown.quantity, value))

@@ -1,6 +1,6 @@
 """Short messages over the picture that never stop the work."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QToolButton, QWidget
@@ -22,6 +22,7 @@ class Toast(QFrame):
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
+        self._over = parent
         self.setObjectName("toast")
         self._icon = PlainLabel()
         self._text = PlainLabel(wordWrap=True, textInteractionFlags=Qt.TextInteractionFlag.TextSelectableByMouse)
@@ -31,7 +32,9 @@ class Toast(QFrame):
         self._layout.addWidget(self._icon)
         self._layout.addWidget(self._text, 1)
         self._buttons: list[QPushButton] = []
-        self._close = QToolButton(icon=icon("close"), toolTip="Close", autoRaise=True)
+        self._close = QToolButton(autoRaise=True)
+        self._close.setIcon(icon("close"))
+        self._close.setToolTip("Close")
         self._close.clicked.connect(self.hide)
         self._layout.addWidget(self._close)
         self._timer = QTimer(self, singleShot=True)
@@ -44,15 +47,15 @@ class Toast(QFrame):
         """The message on screen; empty when there is none."""
         return self._text.text() if not self.isHidden() else ""
 
-    def say(self, text: str, **buttons: Callable[[], None]) -> None:
+    def say(self, text: str, **buttons: Callable[[], object]) -> None:
         """Show a message for a few seconds; each keyword makes a button, ``Show_folder=...``."""
         self._show(text, "info", buttons, SHOWN_MS + 1500 * len(buttons))
 
-    def fail(self, text: str, **buttons: Callable[[], None]) -> None:
+    def fail(self, text: str, **buttons: Callable[[], object]) -> None:
         """Show what went wrong, until it is closed."""
         self._show(text, "failure", buttons, 0)
 
-    def _show(self, text: str, tone: str, buttons: dict[str, Callable[[], None]], milliseconds: int) -> None:
+    def _show(self, text: str, tone: str, buttons: Mapping[str, Callable[[], object]], milliseconds: int) -> None:
         for button in self._buttons:
             button.hide()
             button.deleteLater()
@@ -69,7 +72,7 @@ class Toast(QFrame):
         self.raise_()
         self._place()
 
-    def _button(self, name: str, call: Callable[[], None]) -> QPushButton:
+    def _button(self, name: str, call: Callable[[], object]) -> QPushButton:
         button = QPushButton(name)
         button.setFlat(True)
         button.clicked.connect(self.hide)
@@ -78,7 +81,7 @@ class Toast(QFrame):
         return button
 
     def _place(self) -> None:
-        room = self.parentWidget().width() - 8 * STEP
+        room = self._over.width() - 8 * STEP
         self._text.setWordWrap(False)
         width = self.sizeHint().width()
         if width > min(room, 720):
@@ -86,7 +89,7 @@ class Toast(QFrame):
             width = min(room, 720)
         self.setFixedWidth(width)
         self.setFixedHeight(max(self.heightForWidth(width), self.sizeHint().height()) if width else 0)
-        self.move((self.parentWidget().width() - width) // 2, 4 * STEP)
+        self.move((self._over.width() - width) // 2, 4 * STEP)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Stay centred when the viewport is resized."""

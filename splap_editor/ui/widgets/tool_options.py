@@ -84,18 +84,20 @@ class HeldForm(QWidget):
 
     def _editor(self, name: str, hint: FieldHint, row: QHBoxLayout) -> QWidget:
         if isinstance(getattr(self._held.value, name), bool):
-            editor = QCheckBox(hint.label, toolTip=hint.tip)
-            editor.toggled.connect(lambda on: self._take(name, on))
-        else:
-            editor = NumberField(hint.low, hint.high, decimals=hint.decimals, step=hint.step, unit=hint.unit)
-            editor.setToolTip(hint.tip)
-            editor.setFixedWidth(64)
-            grip = ScrubLabel(hint.label, editor)
-            for told in (editor.committed, grip.moved):
-                told.connect(lambda number: self._take(name, number / hint.factor))
-            row.addWidget(grip)
-        row.addWidget(editor)
-        return editor
+            switch = QCheckBox(hint.label)
+            switch.setToolTip(hint.tip)
+            switch.toggled.connect(lambda on: self._take(name, on))
+            row.addWidget(switch)
+            return switch
+        field = NumberField(hint.low, hint.high, decimals=hint.decimals, step=hint.step, unit=hint.unit)
+        field.setToolTip(hint.tip)
+        field.setFixedWidth(64)
+        grip = ScrubLabel(hint.label, field)
+        for told in (field.committed, grip.moved):
+            told.connect(lambda number: self._take(name, number / hint.factor))
+        row.addWidget(grip)
+        row.addWidget(field)
+        return field
 
     def _take(self, name: str, value: Any) -> None:
         self._held.set(replace(self._held.value, **{name: value}))
@@ -105,7 +107,7 @@ class HeldForm(QWidget):
             value = getattr(self._held.value, name)
             if isinstance(editor, QCheckBox):
                 editor.setChecked(value)
-            else:
+            elif isinstance(editor, NumberField):
                 editor.show_value(self._hints[name].factor * value)
 
 

@@ -55,6 +55,7 @@ class WeightLegend(QWidget):
         width = max(bar, metrics.horizontalAdvance(self.title)) + 6 * STEP
         height = 2 * metrics.lineSpacing() + BAR_PX + 5 * STEP
         parent = self.parentWidget()
+        assert parent is not None
         self.setGeometry(
             round(parent.width() - width) - 3 * STEP,
             round(parent.height() - height) - 3 * STEP,
