@@ -188,7 +188,15 @@ def _deform(options: argparse.Namespace) -> int:
     edit = edit_for(held, file, report.say)
     cache = None if options.no_cache else StageCache(say=lambda text: report.say(f"note: {text}"))
     made = posed(file, edit, cache=cache, stages=report.stage, run=side_by_side(), with_surface=bool(columns))
-    summary = write_posed(options.output, file, made, columns=columns, as_3dgs=options.as_3dgs, stages=report.stage)
+    summary = write_posed(
+        options.output,
+        file,
+        made.kernels,
+        columns=columns,
+        snapshot=made.snapshot if columns else None,
+        as_3dgs=options.as_3dgs,
+        stages=report.stage,
+    )
     report.end_stage()
     deformation = made.deformation
     if not options.json:
@@ -250,9 +258,9 @@ def _info(options: argparse.Namespace) -> int:
         info, ellipses = scene_info(file)
         info["saving_loses"] = losses_by_format(file)
     if options.graph:
-        from splap_editor.engine.surface import surface_of
+        from splap_editor.engine.scripting import prepare
 
-        surface = surface_of(file.splats, GraphOptions(), ellipses=ellipses, stages=report.stage)
+        surface = prepare(file, ellipses=ellipses, stages=report.stage)
         report.end_stage()
         info["graph"] = graph_info(surface.graph)
     if options.graph:
@@ -262,31 +270,16 @@ def _info(options: argparse.Namespace) -> int:
 
 
 def _graph(options: argparse.Namespace) -> int:
-    import numpy as np
-
-    from splap_editor.core.graph.ellipse_offset import normal_offsets
-    from splap_editor.core.graph.splat_graph import splat_graph
-    from splap_editor.core.splats.occupancy import occupancy_ellipses
     from splap_editor.engine.scene_info import graph_info
-    from splap_editor.io.edges_ply import write_edges_ply
+    from splap_editor.engine.scripting import write_graph
     from splap_editor.io.splat_files import read_splats
 
     report = StageReport(quiet=options.quiet or options.json)
     with report("read"):
         file = read_splats(options.file, layout=options.layout, progress=report.progress)
-    with report("occupancy"):
-        ellipses = occupancy_ellipses(file.splats)
-    with report("graph"):
-        wanted = GraphOptions(**{name: value for name, value in vars(options).items() if name in EDGE_OPTIONS})
-        graph = splat_graph(ellipses, wanted, progress=report.progress)
-    with report("offsets"):
-        offsets = normal_offsets(ellipses, graph.edges).min(axis=1)
-    with report("write"):
-        rows = ellipses.rows[graph.edges]
-        means = np.asarray(file.splats.means, np.float64)
-        lengths = np.linalg.norm(means[rows[:, 0]] - means[rows[:, 1]], axis=1)
-        write_edges_ply(options.output, file.splats.means, rows, offsets, lengths)
-    info = graph_info(graph)
+    wanted = GraphOptions(**{name: value for name, value in vars(options).items() if name in EDGE_OPTIONS})
+    info = graph_info(write_graph(options.output, file, wanted, stages=report.stage))
+    report.end_stage()
     print(json.dumps(info)) if options.json else report.say(_readable(info))
     return EXIT_OK
 

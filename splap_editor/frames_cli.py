@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
     from splap_editor.engine.edit import Edit
     from splap_editor.engine.frames import FramePoser
-    from splap_editor.io.ply import SplatFile
+    from splap_editor.io.splat_files import SplatFile
     from splap_editor.viewport.camera import View
     from splap_editor.viewport.studio import Studio
 
@@ -117,9 +117,9 @@ def render(options: argparse.Namespace) -> int:
 def _prepared(
     options: argparse.Namespace, held: plain.Edit | SessionFile | None, report: StageReport
 ) -> tuple["SplatFile", "FramePoser"]:
+    from splap_editor.engine.bound_edit import bound_file
     from splap_editor.engine.cache import StageCache
-    from splap_editor.engine.frames import frame_poser
-    from splap_editor.engine.surface import surface_of
+    from splap_editor.engine.frames import FramePoser
     from splap_editor.io.splat_files import read_splats
     from splap_editor.session.side_by_side import side_by_side
 
@@ -130,12 +130,9 @@ def _prepared(
         report.say(f"note: {warning}")
     edit = edit_for(held, file, report.say)
     cache = None if options.no_cache else StageCache(say=lambda text: report.say(f"note: {text}"))
-    surface = None
-    if edit.active_handles:
-        surface = surface_of(file.splats, edit.graph, cache=cache, stages=report.stage)
-        report.end_stage()
-    with report("bind"):
-        return file, frame_poser(surface, edit, cache=cache, progress=report.progress, run=side_by_side())
+    _, bound = bound_file(file, edit, cache=cache, stages=report.stage, run=side_by_side())
+    report.end_stage()
+    return file, FramePoser(edit, bound)
 
 
 def _studio(

@@ -23,9 +23,14 @@ def keys_table() -> str:
 
 def with_keys_table(text: str) -> str:
     """Put the table between the marks of a README."""
-    before, _, rest = text.partition(START)
-    _, _, after = rest.partition(END)
-    return f"{before}{START}{keys_table()}{END}{after}"
+    return with_block(text, START, keys_table(), END)
+
+
+def with_block(text: str, start: str, block: str, end: str) -> str:
+    """Put a block between two marks of a text."""
+    before, _, rest = text.partition(start)
+    _, _, after = rest.partition(end)
+    return f"{before}{start}{block}{end}{after}"
 
 
 if __name__ == "__main__":

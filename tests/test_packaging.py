@@ -90,7 +90,7 @@ def test_the_package_itself_imports_nothing_that_takes_time():
 
 
 def test_scripts_get_about_ten_names_and_each_is_called_so():
-    assert len(splap_editor.__all__) <= 12
+    assert len(splap_editor.__all__) <= 14
     for name in splap_editor.__all__:
         assert getattr(splap_editor, name).__name__.removeprefix("splap_editor.") == name
         assert splap_editor.__dict__[name].__doc__

@@ -9,6 +9,7 @@ import pytest
 
 import splap_editor as splap
 from splap_editor.resources import resource
+from tests.recipe_table import END, START, with_recipe_table
 
 README = Path(__file__).resolve().parent.parent / "README.md"
 
@@ -27,6 +28,12 @@ def test_the_example_runs_and_its_one_call_twin_writes_the_same_file(tmp_path, m
     assert (tmp_path / "twin.ply").read_bytes() == (tmp_path / "bent.ply").read_bytes()
 
 
+def test_the_recipe_table_says_the_options_there_are():
+    text = README.read_text(encoding="utf-8")
+    assert text.count(START) == text.count(END) == 1
+    assert text == with_recipe_table(text), "run python -m tests.recipe_table"
+
+
 def test_an_edit_of_a_script_comes_back_from_its_recipe(tmp_path):
     edit = splap.Edit(
         handles=[splap.Handle(center=(0.0, 0.0, 1.0), radius=0.1, scale=2.0)],
@@ -39,7 +46,7 @@ def test_an_edit_of_a_script_comes_back_from_its_recipe(tmp_path):
         [splap.Handle("", (0.0, 0.0, 1.0), 0.1, scale=2.0)], edit.pins, "bbw", edit.options
     )
     assert repr(edit).startswith("Edit(handles=(Handle(name='', center=(0.0, 0.0, 1.0)")
-    assert repr(edit.pins) == "(Pin(center=None, radius=None, rows=(3, 4)),)"
+    assert repr(edit.pins).startswith("(Pin(center=None, radius=None, rows=(3, 4)")
 
 
 def test_the_options_of_every_part_of_an_edit_go_by_their_names():

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from splap_editor.core.adaptation.options import AdaptationOptions
 from splap_editor.core.arap.options import ARAP_SOLVERS, ArapOptions
 from splap_editor.core.bbw.options import BbwOptions
 from splap_editor.core.options import OptionSet, loaded
@@ -56,6 +57,11 @@ class DeformerRow:
     def bound_by(self) -> tuple[type, ...]:
         """Option groups after whose change it must be bound again."""
         return (self.options, ReachOptions) if self.has_free_radius else (self.options,)
+
+    @property
+    def posed_by(self) -> tuple[type, ...]:
+        """Option groups after whose change what is bound must be posed again."""
+        return (AdaptationOptions,)
 
     @property
     def modules(self) -> tuple[str, ...]:

@@ -28,7 +28,7 @@ from splap_editor.engine.recipe_edit import edit_of, require_rows_fit
 from splap_editor.engine.sources import source_hash
 from splap_editor.engine.surface import Surface, surface_of
 from splap_editor.io import plain_edit as plain
-from splap_editor.io.ply import SplatFile
+from splap_editor.io.splat_files import SplatFile
 
 if TYPE_CHECKING:
     from splap_editor.core.bbw.bbw import WeightedDeformer
@@ -224,15 +224,30 @@ def posed(
     if isinstance(edit, plain.Edit):
         require_rows_fit(edit, file)
         edit = edit_of(edit, file.splats)
-    if not edit.active_handles and not with_surface:
-        return Posed(file.splats)
-    surface = surface_of(file.splats, edit.graph, cache=cache, stages=stages)
-    if not edit.active_handles:
+    surface, bound = bound_file(file, edit, cache=cache, stages=stages, run=run, with_surface=with_surface)
+    if bound is None:
         return Posed(file.splats, surface)
-    bound = bind(surface, edit, cache=cache, progress=stages("bind"), run=run)
     deformation = bound.deformer.solve(edit.transforms, progress=stages("solve"))
     stages("adapt")
     return bound.adapted(edit, deformation)
+
+
+def bound_file(
+    file: SplatFile,
+    edit: Edit,
+    *,
+    cache: StageCache | None = None,
+    stages: StageProgress = silent,
+    run: Runner = in_turn,
+    with_surface: bool = False,
+) -> tuple[Surface | None, BoundEdit | None]:
+    """Make the surface of a file and bind an edit to it, as far as needed; parameters as of `posed`."""
+    if not edit.active_handles and not with_surface:
+        return None, None
+    surface = surface_of(file.splats, edit.graph, cache=cache, stages=stages)
+    if not edit.active_handles:
+        return surface, None
+    return surface, bind(surface, edit, cache=cache, progress=stages("bind"), run=run)
 
 
 def ready_for_drags(surface: Surface) -> None:

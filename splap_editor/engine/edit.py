@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.adaptation.options import AdaptationOptions
 from splap_editor.core.deformers import DeformerRow, deformer_row
 from splap_editor.core.graph.options import GraphOptions
 from splap_editor.core.handle_nodes import Region
@@ -209,6 +208,5 @@ def binds_like(a: Edit, b: Edit) -> bool:
 
 def poses_like(a: Edit, b: Edit) -> bool:
     """Whether two edits that bind alike also give the same kernels."""
-    return a.options[AdaptationOptions] == b.options[AdaptationOptions] and [h.pose for h in a.active_handles] == [
-        h.pose for h in b.active_handles
-    ]
+    same_options = all(a.options[group] == b.options[group] for group in a.deformer.posed_by)
+    return same_options and [h.pose for h in a.active_handles] == [h.pose for h in b.active_handles]

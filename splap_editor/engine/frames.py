@@ -5,15 +5,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
-from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels, adapted_splats
+from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
 from splap_editor.core.progress import Progress, Runner, in_turn, no_progress, part_of
 from splap_editor.core.timeline import LAST_FRAME
 from splap_editor.engine.bound_edit import BoundEdit, bind
 from splap_editor.engine.cache import StageCache
 from splap_editor.engine.edit import Edit
 from splap_editor.engine.keyframes import edit_at_frame
+from splap_editor.engine.scripting import write_posed
 from splap_editor.engine.surface import Surface
-from splap_editor.io.splat_files import SplatFile, write_splats
+from splap_editor.io.splat_files import SplatFile
 
 Pixels = TypeVar("Pixels")
 
@@ -112,8 +113,7 @@ def write_frames(
     for done, kernels in _posed(poser, frames, progress):
         frame = frames[done]
         written.append(frame_path(path, frame, frames[-1]))
-        splats = file.splats if kernels is None else adapted_splats(file.splats, kernels)
-        write_splats(written[-1], file, splats, as_3dgs=as_3dgs)
+        write_posed(written[-1], file, kernels, as_3dgs=as_3dgs)
         progress((done + 1) / len(frames))
     return written
 

@@ -4,15 +4,22 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
+from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels, adapted_splats
+from splap_editor.core.graph.ellipse_offset import normal_offsets
 from splap_editor.core.graph.options import GraphOptions
+from splap_editor.core.graph.splat_graph import SplatGraph, splat_graph
 from splap_editor.core.progress import Runner, StageProgress, in_turn, silent
-from splap_editor.engine.bound_edit import Posed, posed
+from splap_editor.core.splats.occupancy import Ellipses, occupancy_ellipses
+from splap_editor.engine.bound_edit import posed
 from splap_editor.engine.cache import StageCache
 from splap_editor.engine.edit import Edit
 from splap_editor.engine.export_report import ExportReport, export_report
-from splap_editor.engine.quantities import columns_of
+from splap_editor.engine.quantities import Snapshot, columns_of
 from splap_editor.engine.surface import Surface, surface_of
 from splap_editor.io import plain_edit as plain
+from splap_editor.io.edges_ply import write_edges_ply
 from splap_editor.io.splat_files import SplatFile, read_splats, write_splats
 
 
@@ -20,6 +27,7 @@ def prepare(
     file: SplatFile,
     options: GraphOptions = GraphOptions(),
     *,
+    ellipses: Ellipses | None = None,
     cache: StageCache | None = None,
     stages: StageProgress = silent,
 ) -> Surface:
@@ -29,12 +37,14 @@ def prepare(
     ----------
     file : SplatFile
     options : GraphOptions
+    ellipses : Ellipses, optional
+        The scene's occupancy ellipses where they are at hand.
     cache : StageCache, optional
         Keeps the slow stages between runs.
     stages : callable
         ``stages(name)`` gives the progress callback of a stage.
     """
-    return surface_of(file.splats, options, cache=cache, stages=stages)
+    return surface_of(file.splats, options, ellipses=ellipses, cache=cache, stages=stages)
 
 
 def deform(
@@ -67,15 +77,17 @@ def deform(
     """
     file = read_splats(source, layout=layout, progress=stages("read"))
     made = posed(file, edit, cache=cache, stages=stages, run=run, with_surface=bool(columns))
-    return write_posed(output, file, made, columns=columns, as_3dgs=as_3dgs, stages=stages)
+    snapshot = made.snapshot if columns else None
+    return write_posed(output, file, made.kernels, columns=columns, snapshot=snapshot, as_3dgs=as_3dgs, stages=stages)
 
 
 def write_posed(
     path: str | os.PathLike[str],
     file: SplatFile,
-    made: Posed,
+    kernels: AdaptedKernels | None,
     *,
     columns: Sequence[str] = (),
+    snapshot: Snapshot | None = None,
     as_3dgs: bool = False,
     stages: StageProgress = silent,
 ) -> ExportReport:
@@ -85,18 +97,53 @@ def write_posed(
     ----------
     path : path
     file : SplatFile
-    made : Posed
-        Its splats.
+    kernels : AdaptedKernels or None
+        None where everything is at rest.
     columns : sequence of str
-        Quantities to write too; they need ``made`` to have a surface.
+        Quantities to write too.
+    snapshot : Snapshot
+        What they are worked out from; needed where there are any.
     as_3dgs : bool
         Add a thin third scale to a file of two.
     stages : callable
         ``stages(name)`` gives the progress callback of a stage.
     """
+    if columns and snapshot is None:
+        raise ValueError("columns need the snapshot that they are worked out from")
     stages("colour")
-    splats = made.splats
+    splats = file.splats if kernels is None else adapted_splats(file.splats, kernels)
     progress = stages("write")
-    extra = columns_of(columns, made.snapshot) if columns else {}
+    extra = columns_of(columns, snapshot) if snapshot is not None else {}
     write_splats(path, file, splats, as_3dgs=as_3dgs, extra=extra, progress=progress)
-    return export_report(Path(path), file.splats, made.kernels)
+    return export_report(Path(path), file.splats, kernels)
+
+
+def write_graph(
+    path: str | os.PathLike[str],
+    file: SplatFile,
+    options: GraphOptions = GraphOptions(),
+    *,
+    stages: StageProgress = silent,
+) -> SplatGraph:
+    """Write the splat graph of a file as a PLY: its splats' centres, and the edges with offset and length.
+
+    Parameters
+    ----------
+    path : path
+    file : SplatFile
+    options : GraphOptions
+        Of what is made from the graph nothing matters.
+    stages : callable
+        ``stages(name)`` gives the progress callback of a stage.
+    """
+    stages("occupancy")
+    ellipses = occupancy_ellipses(file.splats)
+    graph = splat_graph(ellipses, options, progress=stages("graph"))
+    stages("offsets")
+    offsets = normal_offsets(ellipses, graph.edges).min(axis=1)
+    stages("write")
+    rows = ellipses.rows[graph.edges]
+    means = np.asarray(file.splats.means, np.float64)
+    lengths = np.linalg.norm(means[rows[:, 0]] - means[rows[:, 1]], axis=1)
+    write_edges_ply(path, file.splats.means, rows, offsets, lengths)
+    return graph

@@ -7,17 +7,19 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels, adapted_splats
+from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
 from splap_editor.core.deformer import Deformation
 from splap_editor.core.graph.splat_graph import GraphOptions
+from splap_editor.core.progress import Progress
 from splap_editor.core.splats.occupancy import occupancy_ellipses
 from splap_editor.engine.bound_edit import BoundEdit, Posed, bind, ready_for_drags
 from splap_editor.engine.cache import StageCache
 from splap_editor.engine.edit import Edit
-from splap_editor.engine.export_report import ExportReport, export_report
-from splap_editor.engine.quantities import Snapshot, columns_of
+from splap_editor.engine.export_report import ExportReport
+from splap_editor.engine.quantities import Snapshot
+from splap_editor.engine.scripting import write_posed
 from splap_editor.engine.surface import Surface, surface_of
-from splap_editor.io.splat_files import SplatFile, read_splats, write_splats
+from splap_editor.io.splat_files import SplatFile, read_splats
 from splap_editor.session.depictor import Depictor, HandOver
 from splap_editor.session.jobs import Job
 from splap_editor.session.scene import Scene
@@ -196,11 +198,25 @@ class ExportRequest:
     snapshot: Snapshot = field(repr=False)
 
 
+EXPORT_WORDS = {"colour": "rotating colours", "write": "writing"}
+"""Stages of an export as the window says them."""
+
+
 def exported_file(job: Job, request: ExportRequest) -> ExportReport:
     """Write a file as it is posed."""
-    job.report(0.1, "rotating colours")
-    file, kernels, order = request.file, request.kernels, request.order
-    splats = file.splats if kernels is None else adapted_splats(file.splats, kernels)
-    extra = columns_of(order.columns, request.snapshot)
-    write_splats(order.path, file, splats, extra=extra, progress=job.progress("writing"), as_3dgs=order.as_3dgs)
-    return export_report(order.path, file.splats, kernels)
+    order = request.order
+
+    def stages(stage: str) -> Progress:
+        told = job.progress(EXPORT_WORDS[stage])
+        told(0.1)
+        return told
+
+    return write_posed(
+        order.path,
+        request.file,
+        request.kernels,
+        columns=order.columns,
+        snapshot=request.snapshot,
+        as_3dgs=order.as_3dgs,
+        stages=stages,
+    )

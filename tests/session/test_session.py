@@ -11,7 +11,7 @@ import pytest
 from splap_editor.cli import main as command_line
 from splap_editor.core.bbw.options import BbwOptions
 from splap_editor.core.reach_options import ReachOptions
-from splap_editor.engine import surface_stages
+from splap_editor.engine import scripting, surface_stages
 from splap_editor.engine.cache import StageCache
 from splap_editor.engine.edit import Pose
 from splap_editor.io.ply import read_ply
@@ -255,7 +255,7 @@ def test_every_job_can_be_cancelled_and_leaves_everything_as_it_was(kind, main, 
         opened.change_edit(edit.with_poses({handle.handle_id: Pose((0.1, 0.0, 0.0))}), "Move handle")
     else:
         waits = lambda *args, progress, **more: waits_until_cancelled(started, progress)  # noqa: E731
-        monkeypatch.setattr(work, "write_splats", waits)
+        monkeypatch.setattr(scripting, "write_splats", waits)
         opened.export(out)
     main.run_until(started.is_set)
     opened.halt()
