@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.progress import Progress, no_progress
 from splap_editor.core.timeline import LAST_FRAME, Key, Timeline
 from splap_editor.io.atomic_file import atomic_file
 from splap_editor.io.json_object import JsonObject, json_lines, parsed_json, shown
@@ -54,12 +55,18 @@ class SessionFileError(ValueError):
     """A session file that cannot be read or written; the message is one sentence for the user."""
 
 
-def content_hash(path: str | os.PathLike[str]) -> str:
-    """Hash of a file's bytes, ``"blake2b:…"``; the name and date do not count."""
+def content_hash(path: str | os.PathLike[str], progress: Progress = no_progress) -> str:
+    """Hash of a file's bytes, ``"blake2b:…"``; the name and date do not count.
+
+    ``progress`` is told the share done for each MiB, and may cancel.
+    """
     digest = hashlib.blake2b(digest_size=16)
     with open_regular(path) as file:
+        n_bytes, done = os.fstat(file.fileno()).st_size, 0
         while chunk := file.read(_HASH_CHUNK):
             digest.update(chunk)
+            done += len(chunk)
+            progress(min(done / max(n_bytes, 1), 1.0))
     return f"blake2b:{digest.hexdigest()}"
 
 

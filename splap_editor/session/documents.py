@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from splap_editor.core.progress import Progress, no_progress
 from splap_editor.io.session_file import content_hash, read_session_file, write_session_file
 from splap_editor.io.session_specs import SessionFile
 from splap_editor.session.jobs import Job, Post, Worker
@@ -159,7 +160,7 @@ class Documents:
     def _open(self, title: str, read: Callable[[Job], _Arrival], folder: Path, ply: Path | None = None) -> None:
         def located(job: Job) -> tuple[_Arrival, Path]:
             arrival = read(job)
-            return arrival, _located(arrival, folder, ply)
+            return arrival, _located(arrival, folder, ply, job.progress("checking the PLY"))
 
         def done(found: tuple[_Arrival, Path]) -> None:
             arrival, source = found
@@ -182,7 +183,7 @@ class Documents:
         scene = self._session.shown_scene
         arrival, self._arrival = self._arrival, None
         self._source = source = _Source(scene.file.path)
-        self._hashing.ask(lambda job: _take_digest(source), lambda done: None)
+        self._hashing.ask(lambda job: _take_digest(source, job.report), lambda done: None)
         if arrival is None or arrival.scene is not scene:
             self.path = None
             self._kept = self.state()
@@ -226,16 +227,16 @@ class Documents:
         self.worker.submit(Job("save", title, write, done, lambda error: self.failed.emit(title, error)))
 
 
-def _take_digest(source: _Source) -> None:
+def _take_digest(source: _Source, progress: Progress = no_progress) -> None:
     """Hash the PLY unless that is done; a file that is gone by now has none."""
     if not source.digest:
         try:
-            source.digest = content_hash(source.path)
+            source.digest = content_hash(source.path, progress)
         except OSError:
             source.digest = ""
 
 
-def _located(arrival: _Arrival, folder: Path, ply: Path | None) -> Path:
+def _located(arrival: _Arrival, folder: Path, ply: Path | None, progress: Progress) -> Path:
     """Find the PLY: where it is said to be, by its old place seen from the session file, or beside that."""
     spec = arrival.session.ply
     named = Path(spec.path)
@@ -243,6 +244,6 @@ def _located(arrival: _Arrival, folder: Path, ply: Path | None) -> Path:
     source = next((place for place in places if place.is_file()), None)
     if source is None:
         raise MissingPlyError(arrival.document, arrival.session)
-    if spec.content_hash and content_hash(source) != spec.content_hash:
+    if spec.content_hash and content_hash(source, progress) != spec.content_hash:
         arrival.notes.append(f"{source.name} has changed since this was saved; the edit may not fit it any more.")
     return Path(os.path.abspath(source))

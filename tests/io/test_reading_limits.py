@@ -3,6 +3,8 @@
 import os
 import subprocess
 import sys
+import zlib
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +12,9 @@ import pytest
 
 import splap_editor
 from splap_editor.core.progress import Cancelled
+from splap_editor.engine.cache import HEAD, MAGIC
 from splap_editor.io.ply import PlyError, read_ply
+from splap_editor.io.session_file import content_hash
 from tests.reference.ply import compressed_bytes, ply_bytes, splat_columns
 
 MEASURED = """
@@ -108,6 +112,91 @@ def test_memory_stays_within_eight_times_the_file(case, tmp_path):
     assert int(done.stdout) <= 8 * path.stat().st_size + BASE // 4
 
 
+def many_numbers():
+    """Text of two bytes a number, as many of them as a document may hold."""
+    rows = ",".join("1" for _ in range(3_900_000))
+    return f'{{"version": 1, "handles": [{{"rows": [{rows}]}}]}}'.encode()
+
+
+def session_of_many_numbers():
+    start = b'{"format": "splap-session", "version": 1, "ply": {"path": "a.ply", "n_splats": 4}, "recipe": '
+    return start + many_numbers() + b', "handles": [{"id": 1, "color": "#f2a93b"}]}'
+
+
+def archive(write):
+    data = BytesIO()
+    write(data, Vth_pdf=np.zeros(N_NUMBERS, np.float32), Vth_opa=np.zeros(1, np.float32))
+    return data.getvalue()
+
+
+def cache_entry():
+    data = archive(np.savez)
+    return HEAD.pack(MAGIC, len(data), zlib.crc32(data)) + data
+
+
+N_NUMBERS = 1 << 22
+THRESHOLDS = f"""
+from splap_editor.io.thresholds import read_thresholds
+read = lambda path: read_thresholds(path, {N_NUMBERS})
+"""
+SESSION = "from splap_editor.io.session_file import read_session_file as read"
+ENTRY = """
+from splap_editor.engine.cache import StageCache
+read = lambda path: StageCache(path.parent).load(path.stem, dict)
+"""
+# What makes and what reads each, and what that may take beside eight times the file.
+OTHERS = {
+    "recipe.json": (many_numbers, "from splap_editor.io.recipe import read_recipe as read", BASE),
+    "session.splap": (
+        session_of_many_numbers,
+        "from splap_editor.io.session_file import read_session_file as read",
+        BASE,
+    ),
+    "plain.npz": (
+        lambda: archive(np.savez),
+        THRESHOLDS,
+        BASE // 4,
+    ),
+    "packed.npz": (
+        lambda: archive(np.savez_compressed),
+        THRESHOLDS,
+        BASE // 4,
+    ),
+    "entry.npz": (
+        cache_entry,
+        ENTRY,
+        BASE // 4,
+    ),
+}
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="the peak is asked of Linux")
+@pytest.mark.parametrize("name", OTHERS)
+def test_memory_of_other_files_stays_within_eight_times_the_file(name, tmp_path):
+    data, reader, beside = OTHERS[name]
+    path = tmp_path / name
+    path.write_bytes(data())
+    program = f"""
+import sys
+from pathlib import Path
+import numpy as np, zipfile
+{reader}
+
+def peak():
+    return int(Path("/proc/self/status").read_text().partition("VmHWM:")[2].split()[0]) * 1024
+
+before = peak()
+held = read(Path(sys.argv[1]))
+assert held is not None and not isinstance(held, str), held
+print(peak() - before)
+"""
+    env = {**os.environ, "PYTHONPATH": str(Path(splap_editor.__file__).parents[1])}
+    done = subprocess.run(
+        [sys.executable, "-c", program, path], capture_output=True, text=True, env=env, check=True, timeout=120
+    )
+    assert int(done.stdout) <= 8 * path.stat().st_size + beside
+
+
 @pytest.mark.parametrize("case", ["binary", "text", "uneven faces", "lists among the columns"])
 def test_reading_asks_often_whether_it_shall_stop(case, tmp_path):
     path = tmp_path / "scene.ply"
@@ -136,3 +225,17 @@ def test_rows_without_columns_before_lists_are_refused_at_once(tmp_path):
     (tmp_path / "scene.ply").write_bytes(header + more + b"element vertex" + body)
     with pytest.raises(PlyError, match="4,000,000,000 rows of an element 'a' without a column"):
         read_ply(tmp_path / "scene.ply")
+
+
+def test_hashing_asks_for_each_mebibyte_whether_it_shall_stop(tmp_path):
+    path = tmp_path / "scene.ply"
+    path.write_bytes(bytes((5 << 20) + 3))
+    shares = []
+    whole = content_hash(path, shares.append)
+    assert whole == content_hash(path) and len(shares) == 6 and shares == sorted(shares) and shares[-1] == 1.0
+
+    def cancel(share):
+        raise Cancelled
+
+    with pytest.raises(Cancelled):
+        content_hash(path, cancel)
