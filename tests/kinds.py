@@ -27,6 +27,7 @@ _KIND_OF = {
     "installation/test_system_packages.py": "window",
     "campaign": "pure",
     "test_campaign.py": "pure",
+    "test_paper_benchmark.py": "pure",
     "test_cli.py": "pure",
     "test_frames_cli.py": "offscreen",
     "test_contributing.py": "pure",
