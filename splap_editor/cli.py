@@ -192,6 +192,7 @@ def _deform(options: argparse.Namespace) -> int:
         options.output,
         file,
         made.kernels,
+        made.edit,
         columns=columns,
         snapshot=made.snapshot if columns else None,
         as_3dgs=options.as_3dgs,

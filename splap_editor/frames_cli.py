@@ -91,7 +91,7 @@ def render(options: argparse.Namespace) -> int:
         output.mkdir(parents=True, exist_ok=True)
         output = output / f"{file.path.stem}.png"
     with report("scene"):
-        studio, view = _studio(options, held, file)
+        studio, view = _studio(options, held, file, poser.edit)
     try:
 
         def draw(kernels: "AdaptedKernels | None") -> "NDArray[np.uint8]":
@@ -136,7 +136,7 @@ def _prepared(
 
 
 def _studio(
-    options: argparse.Namespace, held: plain.Edit | SessionFile | None, file: "SplatFile"
+    options: argparse.Namespace, held: plain.Edit | SessionFile | None, file: "SplatFile", edit: "Edit"
 ) -> tuple["Studio", "View"]:
     """The scene off screen as the session shows it, with the choices of the command line over that."""
     import numpy as np
@@ -144,6 +144,7 @@ def _studio(
 
     from splap_editor.viewport.camera import View
     from splap_editor.viewport.looks import background_named, look_named
+    from splap_editor.viewport.scene_view import suggested_up
     from splap_editor.viewport.studio import Studio
 
     # Without a display VTK warns before it draws by other means.
@@ -156,10 +157,10 @@ def _studio(
     width, height = options.size
     is_of_file = session is not None and session.ply.n_splats == file.splats.n_splats
     hidden = session.hidden if session is not None and is_of_file else None
-    studio = Studio(file.splats, look_named(display), width, height, hidden=hidden)
+    studio = Studio(file.splats, look_named(display), width, height, hidden=hidden, removed=edit.removed)
     studio.viewport.set_background(*background_named(display))
     if session is None or session.view is None:
-        return studio, studio.home()
+        return studio, studio.home(edit.place.rotation.T @ suggested_up(file.splats))
     spec = session.view
     studio.viewport.camera.world_up = np.array(spec.world_up)
     eye, focus, up = (np.array(v, np.float64) for v in (spec.position, spec.focal_point, spec.view_up))

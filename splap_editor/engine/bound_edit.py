@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeVar, cast
 
 import numpy as np
@@ -17,6 +17,7 @@ from splap_editor.core.deformers import DEFORMERS
 from splap_editor.core.handle_nodes import handle_nodes
 from splap_editor.core.kept_arrays import Arrays
 from splap_editor.core.options import loaded, world_length
+from splap_editor.core.place import placed_splats
 from splap_editor.core.pose import Pose
 from splap_editor.core.progress import Progress, Runner, StageProgress, in_turn, no_progress, silent
 from splap_editor.core.reach_options import ReachOptions
@@ -25,6 +26,7 @@ from splap_editor.engine.cache import StageCache, content_key
 from splap_editor.engine.edit import Edit
 from splap_editor.engine.quantities import Snapshot
 from splap_editor.engine.recipe_edit import edit_of, require_rows_fit
+from splap_editor.engine.removal import Removal
 from splap_editor.engine.sources import source_hash
 from splap_editor.engine.surface import Surface, surface_of
 from splap_editor.io import plain_edit as plain
@@ -50,6 +52,8 @@ class Posed:
         None where no handle is enabled: then everything is at rest.
     deformation : Deformation or None
     kernels : AdaptedKernels or None
+    edit : Edit
+        Says what of the splats is written, and where.
     """
 
     rest: Splats
@@ -57,11 +61,12 @@ class Posed:
     bound: BoundEdit | None = None
     deformation: Deformation | None = None
     kernels: AdaptedKernels | None = None
+    edit: Edit = field(default_factory=Edit)
 
     @property
     def splats(self) -> Splats:
-        """Splats to write: those of the file, with the changed rows replaced."""
-        return self.rest if self.kernels is None else adapted_splats(self.rest, self.kernels)
+        """Splats to write, removed ones included: those of the file, with the changed rows replaced, in their place."""
+        return written_splats(self.rest, self.kernels, self.edit)
 
     @property
     def snapshot(self) -> Snapshot:
@@ -143,7 +148,7 @@ class BoundEdit:
     def adapted(self, edit: Edit, deformation: Deformation) -> Posed:
         """Adapt every splat of the file to a deformation."""
         kernels = kernels_of(self.surface, edit, deformation)
-        return Posed(self.surface.binding.splats, self.surface, self, deformation, kernels)
+        return Posed(self.surface.binding.splats, self.surface, self, deformation, kernels, edit)
 
     def _at(self, poses: Edit | Sequence[Pose] | None) -> Edit:
         """Edit at other poses."""
@@ -192,6 +197,8 @@ def bind(
         raise ValueError(
             f"the surface was made with {surface.options}, the edit wants {edit.graph}: prepare it with these"
         )
+    if not edit.removal.like(Removal(mask=surface.ellipses.removed)):
+        raise ValueError("the surface was made of other splats than the edit leaves: prepare it with its removed ones")
     row, handles = edit.deformer, handles_of(surface, edit)
     keep = made_anew if cache is None else _kept_in(cache, (source_hash(*row.modules), surface.key, *_arrays(handles)))
     binding = Binding(progress, stages, run, keep)
@@ -226,7 +233,7 @@ def posed(
         edit = edit_of(edit, file.splats)
     surface, bound = bound_file(file, edit, cache=cache, stages=stages, run=run, with_surface=with_surface)
     if bound is None:
-        return Posed(file.splats, surface)
+        return Posed(file.splats, surface, edit=edit)
     deformation = bound.deformer.solve(edit.transforms, progress=stages("solve"))
     stages("adapt")
     return bound.adapted(edit, deformation)
@@ -244,10 +251,16 @@ def bound_file(
     """Make the surface of a file and bind an edit to it, as far as needed; parameters as of `posed`."""
     if not edit.active_handles and not with_surface:
         return None, None
-    surface = surface_of(file.splats, edit.graph, cache=cache, stages=stages)
+    surface = surface_of(file.splats, edit.graph, removed=edit.removed, cache=cache, stages=stages)
     if not edit.active_handles:
         return surface, None
     return surface, bind(surface, edit, cache=cache, progress=stages("bind"), run=run)
+
+
+def written_splats(rest: Splats, kernels: AdaptedKernels | None, edit: Edit) -> Splats:
+    """Splats to write: as adapted, then in their place."""
+    splats = rest if kernels is None else adapted_splats(rest, kernels)
+    return placed_splats(splats, edit.place)
 
 
 def ready_for_drags(surface: Surface) -> None:

@@ -1,4 +1,4 @@
-"""The edit: handles and their poses, pins and options, as one immutable value."""
+"""The edit: handles and their poses, pins, options, what is removed and where all of it stands, as one value."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
@@ -9,10 +9,13 @@ from numpy.typing import NDArray
 from splap_editor.core.deformers import DeformerRow, deformer_row
 from splap_editor.core.graph.options import GraphOptions
 from splap_editor.core.handle_nodes import Region
+from splap_editor.core.index_spaces import FileMask
 from splap_editor.core.options import Length, OptionSet
+from splap_editor.core.place import Place
 from splap_editor.core.pose import Pose
 from splap_editor.core.reach_options import CageOptions
 from splap_editor.core.timeline import Timeline
+from splap_editor.engine.removal import Removal
 
 HANDLE_COLORS = ("#f2a93b", "#4fb3ff", "#7bd66b", "#e66fb0", "#b18cff", "#ff7a59", "#30bfae", "#d9d24a")
 """Handle colours in the order they are given out; told apart by the colour-blind too when neighbours in the list."""
@@ -96,6 +99,10 @@ class Edit:
         `GraphOptions`, `ReachOptions`, `AdaptationOptions`, and those of every deformer.
     timeline : Timeline
         Poses at other frames than the one shown.
+    removal : Removal
+        Splats that are left out of everything; handles, pins and mends go on counting in the file's rows.
+    place : Place
+        How what comes of all that is moved, turned and scaled as one body on its way into a file.
     """
 
     handles: tuple[Handle, ...] = ()
@@ -103,6 +110,8 @@ class Edit:
     method: str = "arap"
     options: OptionSet = OptionSet()
     timeline: Timeline = field(default_factory=Timeline)
+    removal: Removal = field(default_factory=Removal)
+    place: Place = field(default_factory=Place)
 
     @property
     def graph(self) -> GraphOptions:
@@ -129,9 +138,15 @@ class Edit:
         return np.array([handle.transform for handle in self.active_handles]).reshape(-1, 4, 4)
 
     @property
+    def removed(self) -> FileMask | None:
+        """(N,) splats that are left out; None where none are."""
+        return self.removal.mask
+
+    @property
     def is_identity(self) -> bool:
-        """Whether no enabled handle is moved."""
-        return all(handle.pose.is_identity for handle in self.active_handles)
+        """Whether a file is written as it was read: no enabled handle is moved, nothing left out, all in its place."""
+        is_at_rest = all(handle.pose.is_identity for handle in self.active_handles)
+        return is_at_rest and self.removed is None and self.place.is_identity
 
     def handle(self, handle_id: int) -> Handle:
         """Find a handle by its id; KeyError when there is none."""
@@ -191,7 +206,7 @@ class Edit:
 def binds_like(a: Edit, b: Edit) -> bool:
     """Whether a deformer bound for one edit serves the other: same regions, pins and options it uses, any pose."""
     row = a.deformer
-    if row != b.deformer or a.graph != b.graph or len(a.pins) != len(b.pins):
+    if row != b.deformer or a.graph != b.graph or len(a.pins) != len(b.pins) or not a.removal.like(b.removal):
         return False
     if any(a.options[group] != b.options[group] for group in row.bound_by):
         return False
@@ -210,3 +225,8 @@ def poses_like(a: Edit, b: Edit) -> bool:
     """Whether two edits that bind alike also give the same kernels."""
     same_options = all(a.options[group] == b.options[group] for group in a.deformer.posed_by)
     return same_options and [h.pose for h in a.active_handles] == [h.pose for h in b.active_handles]
+
+
+def writes_like(a: Edit, b: Edit) -> bool:
+    """Whether two edits make the same file of the same splats."""
+    return binds_like(a, b) and poses_like(a, b) and a.place == b.place

@@ -7,6 +7,7 @@ import numpy as np
 
 from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
 from splap_editor.core.splats.splats import Splats
+from splap_editor.engine.edit import Edit
 
 
 @dataclass(frozen=True)
@@ -17,11 +18,15 @@ class ExportReport:
     ----------
     path : Path
     n_splats, n_changed : int
-        Rows in the file, and rows that differ from the source.
+        Rows in the file, and rows that the deformation changed.
     largest_displacement : float
         World units.
     largest_stretch : float
         Largest factor by which a splat's in-plane semi-axis grew or shrank; 1 when none did.
+    n_removed : int
+        Rows of the source that are not in the file.
+    is_placed : bool
+        Everything was moved, turned or scaled as one body.
     """
 
     path: Path
@@ -29,20 +34,28 @@ class ExportReport:
     n_changed: int
     largest_displacement: float
     largest_stretch: float
+    n_removed: int = 0
+    is_placed: bool = False
 
     def __str__(self) -> str:
-        if self.n_changed == 0:
-            return f"{self.path.name}: {self.n_splats:,} splats, unchanged"
-        return (
-            f"{self.path.name}: {self.n_changed:,} of {self.n_splats:,} splats changed, "
-            f"moved by up to {self.largest_displacement:.4g}, stretched by up to {self.largest_stretch:.3g} ×"
-        )
+        parts = [f"{self.path.name}: {self.n_splats:,} splats, unchanged"]
+        if self.n_changed:
+            parts = [
+                f"{self.path.name}: {self.n_changed:,} of {self.n_splats:,} splats changed",
+                f"moved by up to {self.largest_displacement:.4g}",
+                f"stretched by up to {self.largest_stretch:.3g} ×",
+            ]
+        parts += [f"{self.n_removed:,} removed"] if self.n_removed else []
+        parts += ["all of them put in their place"] if self.is_placed else []
+        return ", ".join(parts)
 
 
-def export_report(path: Path, splats: Splats, kernels: AdaptedKernels | None) -> ExportReport:
-    """Compare adapted kernels with the splats they came from."""
+def export_report(path: Path, splats: Splats, kernels: AdaptedKernels | None, edit: Edit) -> ExportReport:
+    """Compare adapted kernels with the splats they came from, before these are put in their place."""
+    n_removed = edit.removal.n_removed
+    n_written, is_placed = splats.n_splats - n_removed, not edit.place.is_identity
     if kernels is None or not kernels.changed.any():
-        return ExportReport(path, splats.n_splats, 0, 0.0, 1.0)
+        return ExportReport(path, n_written, 0, 0.0, 1.0, n_removed, is_placed)
     rows = np.flatnonzero(kernels.changed)
     moved = kernels.means[rows] - np.asarray(splats.means, np.float64)[rows]
     with np.errstate(invalid="ignore", over="ignore"):
@@ -50,8 +63,10 @@ def export_report(path: Path, splats: Splats, kernels: AdaptedKernels | None) ->
     growth = growth[np.isfinite(growth)]
     return ExportReport(
         path,
-        splats.n_splats,
+        n_written,
         len(rows),
         float(np.linalg.norm(moved, axis=1).max()),
         float(np.exp(growth.max())) if growth.size else 1.0,
+        n_removed,
+        is_placed,
     )

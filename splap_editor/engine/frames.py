@@ -113,7 +113,7 @@ def write_frames(
     for done, kernels in _posed(poser, frames, progress):
         frame = frames[done]
         written.append(frame_path(path, frame, frames[-1]))
-        write_posed(written[-1], file, kernels, as_3dgs=as_3dgs)
+        write_posed(written[-1], file, kernels, poser.edit, as_3dgs=as_3dgs)
         progress((done + 1) / len(frames))
     return written
 

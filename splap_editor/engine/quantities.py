@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
     from splap_editor.core.deformer import Handles
+    from splap_editor.core.graph.splat_graph import SplatGraph
     from splap_editor.core.splats.contributions import Contributions
     from splap_editor.engine.surface import Surface
 
@@ -47,6 +48,8 @@ class Snapshot:
         Column of ``weights`` that is asked for.
     picked : int, optional
         File row of the splat that distances count from.
+    bare_graph : SplatGraph, optional
+        The graph alone, where there is no surface.
     """
 
     splats: Splats
@@ -57,6 +60,12 @@ class Snapshot:
     weights: Weights | None = None
     handle: int | None = None
     picked: int | None = None
+    bare_graph: SplatGraph | None = None
+
+    @property
+    def graph(self) -> SplatGraph | None:
+        """The graph, of the surface where there is one."""
+        return self.surface.graph if self.surface is not None else self.bare_graph
 
 
 @dataclass(frozen=True)
@@ -83,6 +92,8 @@ class Quantity:
         The values are names, not amounts: they have colours of their own rather than a place on a scale.
     middle : float, optional
         Value at which nothing has changed; shown in the middle of a two-sided colour map.
+    is_of_rest : bool
+        It depends on the file alone, so that splats can be removed by it.
     """
 
     name: str
@@ -94,10 +105,12 @@ class Quantity:
     is_whole: bool = False
     is_label: bool = False
     middle: float | None = None
+    is_of_rest: bool = False
 
 
 WANTS = {
     "surface": "the surface, which is being prepared",
+    "graph": "the surface, which is being prepared",
     "picked": "a splat: click one with the Inspect tool (I)",
     "handles": "a handle or a pin",
     "weights": "bounded biharmonic weights: choose them as deformer and place a handle",
@@ -112,6 +125,14 @@ def missing(quantity: Quantity, snapshot: Snapshot) -> str:
         if name and getattr(snapshot, name) is None:
             return WANTS.get(name, WANTS["weights"])
     return ""
+
+
+def values_of(quantity: Quantity, snapshot: Snapshot) -> NDArray[np.float64]:
+    """(N,) values in file order; NaN where the quantity is not defined and for splats that are removed."""
+    values, removed = quantity.values(snapshot), snapshot.ellipses.removed
+    if removed is not None:
+        values[removed] = np.nan
+    return values
 
 
 def opacity(snapshot: Snapshot) -> NDArray[np.float64]:
@@ -163,14 +184,14 @@ _CONTRIBUTIONS: WeakKeyDictionary[Ellipses, Contributions] = WeakKeyDictionary()
 
 def degree(snapshot: Snapshot) -> NDArray[np.float64]:
     """Number of graph neighbours; NaN for inert splats."""
-    assert snapshot.surface is not None
-    return _of_nodes(snapshot.ellipses, snapshot.surface.graph.degrees)
+    assert snapshot.graph is not None
+    return _of_nodes(snapshot.ellipses, snapshot.graph.degrees)
 
 
 def component(snapshot: Snapshot) -> NDArray[np.float64]:
     """Component of the graph, 0 the largest; NaN for inert splats."""
-    assert snapshot.surface is not None
-    return _of_nodes(snapshot.ellipses, snapshot.surface.graph.components)
+    assert snapshot.graph is not None
+    return _of_nodes(snapshot.ellipses, snapshot.graph.components)
 
 
 def geodesic_distance(snapshot: Snapshot) -> NDArray[np.float64]:
@@ -268,12 +289,12 @@ def handle_weight(snapshot: Snapshot) -> NDArray[np.float64]:
 QUANTITIES: dict[str, Quantity] = {
     quantity.name: quantity
     for quantity in (
-        Quantity("alpha", "Opacity", "", opacity),
-        Quantity("size", "Size", "length", size),
-        Quantity("flatness", "Flatness", "", flatness),
-        Quantity("contribution", "Contribution to the picture", "×", contribution),
-        Quantity("degree", "Degree", "", degree, "surface", is_whole=True),
-        Quantity("component", "Component", "", component, "surface", is_whole=True, is_label=True),
+        Quantity("alpha", "Opacity", "", opacity, is_of_rest=True),
+        Quantity("size", "Size", "length", size, is_of_rest=True),
+        Quantity("flatness", "Flatness", "", flatness, is_of_rest=True),
+        Quantity("contribution", "Contribution to the picture", "×", contribution, is_of_rest=True),
+        Quantity("degree", "Degree", "", degree, "graph", is_whole=True, is_of_rest=True),
+        Quantity("component", "Component", "", component, "graph", is_whole=True, is_label=True, is_of_rest=True),
         Quantity("geodesic", "Distance along the surface", "length", geodesic_distance, "picked"),
         Quantity("displacement", "Displacement", "length", displacement),
         Quantity("stretch", "Largest stretch", "×", stretch, middle=1.0),
@@ -307,7 +328,7 @@ def columns_of(names: Iterable[str], snapshot: Snapshot) -> dict[str, NDArray[np
         lack = missing(QUANTITIES[name], snapshot)
         if lack:
             raise ValueError(f"the column {name!r} needs {lack}")
-        columns[name] = QUANTITIES[name].values(snapshot)
+        columns[name] = values_of(QUANTITIES[name], snapshot)
     return columns
 
 

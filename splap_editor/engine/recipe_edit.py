@@ -4,8 +4,10 @@ import numpy as np
 
 from splap_editor.core.graph.options import GraphOptions
 from splap_editor.core.handle_nodes import Region
+from splap_editor.core.removal import PickedRows
 from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.edit import HANDLE_COLORS, Edit, Handle, Pin
+from splap_editor.engine.removal import Removal, removal_of
 from splap_editor.io import plain_edit as plain
 from splap_editor.io.formats.table import FORMATS
 from splap_editor.io.plain_edit import Vector
@@ -24,6 +26,8 @@ def recipe_of(edit: Edit, *, with_disabled: bool = False) -> plain.Edit:
         ),
         method=edit.method,
         options=edit.options,
+        remove=edit.removal.steps,
+        place=edit.place,
     )
 
 
@@ -35,7 +39,8 @@ def edit_of(recipe: plain.Edit, splats: Splats) -> Edit:
     Raises
     ------
     RecipeError
-        A row is not in the file, or nothing says which splats a handle or a pin is of.
+        A row is not in the file, nothing says which splats a handle or a pin is of, or there is no such quantity to
+        remove splats by.
     """
     handles = tuple(
         Handle(
@@ -56,6 +61,8 @@ def edit_of(recipe: plain.Edit, splats: Splats) -> Edit:
         ),
         method=recipe.method,
         options=recipe.options,
+        removal=_removal(recipe, splats),
+        place=recipe.place,
     )
 
 
@@ -74,8 +81,9 @@ def require_rows_fit(recipe: plain.Edit, file: SplatFile) -> None:
     """
     graph = recipe.options[GraphOptions]
     regions: list[plain.Handle | plain.Pin] = [*recipe.handles, *recipe.pins]
-    names_rows = any(spec.rows is not None for spec in regions) or graph.cut or graph.add
-    if not names_rows or not (recipe.rows_of or FORMATS[file.format_name].reorders):
+    names_rows = [spec.rows is not None for spec in regions] + [bool(graph.cut or graph.add)]
+    names_rows += [isinstance(step.picked, PickedRows) for step in recipe.remove]
+    if not any(names_rows) or not (recipe.rows_of or FORMATS[file.format_name].reorders):
         return
     if recipe.rows_of != content_hash(file.path):
         raise RecipeError(
@@ -87,6 +95,13 @@ def require_rows_fit(recipe: plain.Edit, file: SplatFile) -> None:
 def rows_of(file: SplatFile) -> str:
     """What a recipe made for a file says as ``rows_of``."""
     return content_hash(file.path) if FORMATS[file.format_name].reorders else ""
+
+
+def _removal(recipe: plain.Edit, splats: Splats) -> Removal:
+    try:
+        return removal_of(recipe.remove, splats)
+    except ValueError as error:
+        raise RecipeError(str(error)) from error
 
 
 def _handle_spec(handle: Handle) -> plain.Handle:

@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
-from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels, adapted_splats
+from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
 from splap_editor.core.graph.ellipse_offset import normal_offsets
 from splap_editor.core.graph.options import GraphOptions
 from splap_editor.core.graph.splat_graph import SplatGraph, splat_graph
+from splap_editor.core.index_spaces import FileMask
 from splap_editor.core.progress import Runner, StageProgress, in_turn, silent
 from splap_editor.core.splats.occupancy import Ellipses, occupancy_ellipses
-from splap_editor.engine.bound_edit import posed
+from splap_editor.engine.bound_edit import posed, written_splats
 from splap_editor.engine.cache import StageCache
 from splap_editor.engine.edit import Edit
 from splap_editor.engine.export_report import ExportReport, export_report
@@ -28,6 +29,7 @@ def prepare(
     options: GraphOptions = GraphOptions(),
     *,
     ellipses: Ellipses | None = None,
+    removed: FileMask | None = None,
     cache: StageCache | None = None,
     stages: StageProgress = silent,
 ) -> Surface:
@@ -39,12 +41,14 @@ def prepare(
     options : GraphOptions
     ellipses : Ellipses, optional
         The scene's occupancy ellipses where they are at hand.
+    removed : (N,) bool, optional
+        Splats that are left out, where the ellipses are not at hand: ``edit.removed``.
     cache : StageCache, optional
         Keeps the slow stages between runs.
     stages : callable
         ``stages(name)`` gives the progress callback of a stage.
     """
-    return surface_of(file.splats, options, ellipses=ellipses, cache=cache, stages=stages)
+    return surface_of(file.splats, options, ellipses=ellipses, removed=removed, cache=cache, stages=stages)
 
 
 def deform(
@@ -78,13 +82,16 @@ def deform(
     file = read_splats(source, layout=layout, progress=stages("read"))
     made = posed(file, edit, cache=cache, stages=stages, run=run, with_surface=bool(columns))
     snapshot = made.snapshot if columns else None
-    return write_posed(output, file, made.kernels, columns=columns, snapshot=snapshot, as_3dgs=as_3dgs, stages=stages)
+    return write_posed(
+        output, file, made.kernels, made.edit, columns=columns, snapshot=snapshot, as_3dgs=as_3dgs, stages=stages
+    )
 
 
 def write_posed(
     path: str | os.PathLike[str],
     file: SplatFile,
     kernels: AdaptedKernels | None,
+    edit: Edit,
     *,
     columns: Sequence[str] = (),
     snapshot: Snapshot | None = None,
@@ -99,6 +106,8 @@ def write_posed(
     file : SplatFile
     kernels : AdaptedKernels or None
         None where everything is at rest.
+    edit : Edit
+        Says which splats are left out, and where all others are put.
     columns : sequence of str
         Quantities to write too.
     snapshot : Snapshot
@@ -111,11 +120,11 @@ def write_posed(
     if columns and snapshot is None:
         raise ValueError("columns need the snapshot that they are worked out from")
     stages("colour")
-    splats = file.splats if kernels is None else adapted_splats(file.splats, kernels)
+    splats = written_splats(file.splats, kernels, edit)
     progress = stages("write")
     extra = columns_of(columns, snapshot) if snapshot is not None else {}
-    write_splats(path, file, splats, as_3dgs=as_3dgs, extra=extra, progress=progress)
-    return export_report(Path(path), file.splats, kernels)
+    write_splats(path, file, splats, removed=edit.removed, as_3dgs=as_3dgs, extra=extra, progress=progress)
+    return export_report(Path(path), file.splats, kernels, edit)
 
 
 def write_graph(

@@ -1,7 +1,7 @@
 """The surface of a scene: every stage from splats to what deformers are bound to, and what is kept of them."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import Any, TypeVar
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from splap_editor.core.adaptation.kernel_binding import KernelBinding
 from splap_editor.core.graph.options import GRAPH_RULES, LAPLACIANS, NEIGHBORHOODS, GraphOptions
 from splap_editor.core.graph.splat_graph import SplatGraph, require_mendable
+from splap_editor.core.index_spaces import FileMask
 from splap_editor.core.progress import StageProgress, silent
 from splap_editor.core.splats.occupancy import Ellipses, occupancy_ellipses
 from splap_editor.core.splats.splats import Splats
@@ -45,6 +46,8 @@ class Surface:
         Carriers of every splat's ellipse.
     key : str
         Hash of everything the above was made from.
+    options : GraphOptions
+        What the graph was asked for with; its stages name no splat that is removed.
     timings_s : dict
         Seconds of each stage made, not loaded.
     """
@@ -53,13 +56,9 @@ class Surface:
     stages: SurfaceStages
     binding: KernelBinding
     key: str
+    options: GraphOptions
     timings_s: dict[str, float] = field(default_factory=dict)
     _shared: dict[Callable[["Surface"], Any], Any] = field(default_factory=dict, repr=False)
-
-    @property
-    def options(self) -> GraphOptions:
-        """What the graph was made with."""
-        return self.stages.options
 
     @property
     def graph(self) -> SplatGraph:
@@ -109,6 +108,7 @@ def surface_of(
     options: GraphOptions,
     *,
     ellipses: Ellipses | None = None,
+    removed: FileMask | None = None,
     cache: StageCache | None = None,
     stages: StageProgress = silent,
     near: Surface | None = None,
@@ -126,6 +126,8 @@ def surface_of(
     options : GraphOptions
     ellipses : Ellipses, optional
         The scene's occupancy ellipses where they are at hand.
+    removed : (N,) bool, optional
+        Splats that are left out, where the ellipses are not at hand. Cut and added edges of theirs are passed over.
     cache : StageCache, optional
         Asked before the slow stages are run, and given their results.
     stages : callable
@@ -146,12 +148,15 @@ def surface_of(
     timed = _Timed(timings)
     if ellipses is None:
         with timed("occupancy"):
-            ellipses = occupancy_ellipses(splats)
+            ellipses = occupancy_ellipses(splats, removed=removed)
     if ellipses.n_nodes == 0:
+        if ellipses.removed is not None:
+            raise ValueError("every visible splat is removed, so there is no surface to deform: restore some")
         raise ValueError(
             "no splat of this file is visible (opacity above 1/255 and a finite size), so there is no surface to "
             "deform; check the layout it was read with"
         )
+    asked, options = options, _without_removed(options, ellipses)
     require_mendable(ellipses, options)
     plain = unmended(options)
     # Tolerances are in units of the scene's size, which opacities have a say in too.
@@ -172,7 +177,20 @@ def surface_of(
         key = content_key((key, options))
     with timed("kernels"):
         binding = KernelBinding(splats, ellipses, made.neighborhoods, graph=made.graph, progress=stages("kernels"))
-    return Surface(ellipses, made, binding, key, timings)
+    return Surface(ellipses, made, binding, key, asked, timings)
+
+
+def _without_removed(options: GraphOptions, ellipses: Ellipses) -> GraphOptions:
+    """Leave out the cut and added edges that end at a splat which is removed."""
+    removed = ellipses.removed
+    if removed is None or not (options.cut or options.add):
+        return options
+
+    def kept(pairs: tuple[tuple[int, int], ...]) -> tuple[tuple[int, int], ...]:
+        # A row beyond the file is refused where all of them are looked at.
+        return tuple(pair for pair in pairs if not any(row < len(removed) and removed[row] for row in pair))
+
+    return replace(options, cut=kept(options.cut), add=kept(options.add))
 
 
 def _made_by(options: GraphOptions) -> str:

@@ -203,6 +203,17 @@ class JsonObject:
         for i, item in enumerate(value):
             yield JsonObject(item, f"{self.at(key)}[{i}]", keys, self._error)
 
+    def one_or_more(self, key: str, keys: tuple[str, ...]) -> "Iterator[JsonObject]":
+        """Yield an object, or those of a list, which may be missing."""
+        if isinstance(self._value.get(key), dict):
+            yield self.object(key, keys)
+        else:
+            yield from self.objects(key, keys)
+
+    def wrong(self, sentence: str) -> ValueError:
+        """Exception that says what is wrong with the object itself."""
+        return self._error(f"{self._path} {sentence}")
+
     def object(self, key: str, keys: tuple[str, ...]) -> "JsonObject":
         """An object; a missing one is empty."""
         return JsonObject(self._value.get(key, {}), self.at(key), keys, self._error)

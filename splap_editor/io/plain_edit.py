@@ -1,10 +1,12 @@
 """An edit as plain values: what a script writes and a recipe holds, by place or file row, of no file in particular."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from splap_editor.core.options import Length, OptionSet
+from splap_editor.core.place import Place
 from splap_editor.core.pose import Pose
 from splap_editor.core.reach_options import CageOptions
+from splap_editor.core.removal import RemovalStep
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -88,6 +90,10 @@ class Edit:
     rows_of : str
         Content hash of the only file that rows may be meant of, ``"blake2b:…"``; empty where any file of that many
         rows will do. Formats that put rows in an order of their own need it.
+    remove : tuple of RemovalStep
+        Splats that are left out of everything.
+    place : Place
+        How all of it is moved, turned and scaled in the end.
     """
 
     handles: tuple[Handle, ...] = ()
@@ -95,8 +101,11 @@ class Edit:
     method: str = "arap"
     options: OptionSet = OptionSet()
     rows_of: str = ""
+    remove: tuple[RemovalStep, ...] = ()
+    place: Place = field(default_factory=Place)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "handles", tuple(self.handles))
         object.__setattr__(self, "pins", tuple(self.pins))
+        object.__setattr__(self, "remove", tuple(self.remove))
         object.__setattr__(self, "options", OptionSet(*self.options))

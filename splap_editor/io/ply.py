@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from splap_editor.core.index_spaces import FileMask
 from splap_editor.core.pose import LARGEST_COORDINATE
 from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.splats.splats import Splats
@@ -161,6 +162,7 @@ def write_ply(
     file: SplatFile,
     splats: Splats,
     *,
+    removed: FileMask | None = None,
     as_3dgs: bool = False,
     extra: Mapping[str, ArrayLike] | None = None,
     progress: Progress = no_progress,
@@ -169,10 +171,10 @@ def write_ply(
 
     Rows, columns, types, their order, comments and extra elements stay; a cell
     is written only where ``splats`` differs from ``file.splats``, so unedited
-    splats give the identical bytes. A changed rotation is written with the
+    splats give the identical bytes, less those of rows that are removed. A changed rotation is written with the
     length the file's quaternion had, and turns the row's normal if that is a
     unit vector. SuperSplat's compressed form is kept for unedited splats only:
-    deformed ones are written as a plain 3DGS file. The target appears whole or
+    where some are deformed or removed, all are written as a plain 3DGS file. The target appears whole or
     not at all, and may be the file that was read.
 
     Parameters
@@ -183,6 +185,8 @@ def write_ply(
         What `read_ply` returned.
     splats : Splats
         Its splats, deformed: same number, scales and degree.
+    removed : (N,) bool, optional
+        Rows that are left out of the file; those that stay keep their bytes and their order.
     as_3dgs : bool
         Give 2DGS splats a third scale of 1e-6, for programs that know only 3DGS.
     extra : dict of (N,) float, optional
@@ -193,14 +197,15 @@ def write_ply(
     Raises
     ------
     PlyError
-        If the file cannot be written.
+        If the file cannot be written, or no row would be left.
     ValueError
-        If ``splats`` or ``extra`` do not match the file.
+        If ``splats``, ``removed`` or ``extra`` do not match the file.
     """
     _require_same_shape(splats, file.splats)
+    kept = kept_rows(removed, file)
     table, rest = file.table, file.splats
     names = file.layout.columns
-    if names is None and (as_3dgs or extra or any_stored_difference(rest, splats)):
+    if names is None and (as_3dgs or extra or kept is not None or any_stored_difference(rest, splats)):
         _require_no_overflow(splats, rest, table.name)
         table, names, rest = plain_table(table.name, splats), COMMON_NAMES, splats
     added: list[NewColumn] = []
@@ -209,9 +214,21 @@ def write_ply(
     else:
         columns = splat_columns(table, names)
         added = _added_columns(table, columns if as_3dgs else None, extra or {})
-        blocks = table.blocks(SplatCells(columns, file.layout, rest, splats, table).changes, added)
-    header = table.header.with_columns([(column.after, column.name) for column in added])
+        blocks = table.blocks(SplatCells(columns, file.layout, rest, splats, table).changes, added, kept)
+    n_rows = table.n_rows if kept is None else int(np.count_nonzero(kept))
+    header = table.header.with_columns([(column.after, column.name) for column in added], n_rows)
     _write_blocks(Path(path), header, blocks, table.body.nbytes, progress)
+
+
+def kept_rows(removed: FileMask | None, file: SplatFile) -> FileMask | None:
+    """(N,) rows that are written; None where all are."""
+    if removed is None or not removed.any():
+        return None
+    if removed.shape != (file.table.n_rows,):
+        raise ValueError(f"removed must have shape ({file.table.n_rows},), got {removed.shape}")
+    if removed.all():
+        raise PlyError(f"every splat of {file.path.name} is removed, so there is nothing to write: restore some.")
+    return ~removed
 
 
 def _write_blocks(

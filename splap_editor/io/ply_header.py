@@ -117,20 +117,25 @@ class PlyHeader:
         """Fewest bytes that must follow the header for it to be true."""
         return sum(e.count * e.smallest_row(ascii_=self.is_ascii) for e in self.elements)
 
-    def with_columns(self, columns: list[tuple[str, str]]) -> bytes:
-        """Raw header with float properties added to the vertex element.
+    def with_columns(self, columns: list[tuple[str, str]], n_rows: int) -> bytes:
+        """Raw header with float properties added to the vertex element, and its number of rows.
 
         Parameters
         ----------
         columns : list of (after, name)
             Each new column and the existing column it follows.
+        n_rows : int
+            Rows of the vertex element.
         """
         lines = self.raw.splitlines(keepends=True)
         inside = False
         out = []
         for line in lines:
-            out.append(line)
             words = _words(line)
+            if words[:2] == [b"element", b"vertex"] and int(words[2]) != n_rows:
+                at = line.rindex(words[2])
+                line = line[:at] + str(n_rows).encode() + line[at + len(words[2]) :]
+            out.append(line)
             if words[:1] == [b"element"]:
                 inside = words[1] == b"vertex"
             elif inside and words[:1] == [b"property"]:

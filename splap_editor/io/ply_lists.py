@@ -35,7 +35,10 @@ class ListTable(PlyTable):
         return self.scalars if name == "vertex" else None
 
     def blocks(
-        self, changes: Callable[[int, int], CellChanges], new_columns: list[NewColumn]
+        self,
+        changes: Callable[[int, int], CellChanges],
+        new_columns: list[NewColumn],
+        kept: NDArray[np.bool_] | None = None,
     ) -> Iterator[NDArray[np.uint8] | bytes]:
         """Yield the body with some cells replaced; lists keep their bytes."""
         vertex, row, end = self.header.vertex, 0, self.start
@@ -52,8 +55,11 @@ class ListTable(PlyTable):
                 places = offsets[where, vertex.names.index(name)] - start
                 size = cells.dtype.itemsize
                 block[places[:, None] + np.arange(size)] = cells.view(np.uint8).reshape(-1, size)
+            sizes = offsets[:, -1] - offsets[:, 0] + 4 * len(new_columns)
             if new_columns:
                 block = self._widened_rows(block, offsets, row, new_columns)
+            if kept is not None:
+                block = block[np.repeat(kept[row : row + len(offsets)], sizes)]
             yield block
             row += len(offsets)
         yield self.body[end:]

@@ -85,7 +85,10 @@ class PlyTable:
         return rows.__array_interface__["data"][0] - self.body.__array_interface__["data"][0]
 
     def blocks(
-        self, changes: Callable[[int, int], CellChanges], new_columns: list[NewColumn]
+        self,
+        changes: Callable[[int, int], CellChanges],
+        new_columns: list[NewColumn],
+        kept: NDArray[np.bool_] | None = None,
     ) -> Iterator[NDArray[np.uint8] | bytes]:
         """Yield the bytes of the body with some cells replaced.
 
@@ -95,6 +98,8 @@ class PlyTable:
             What differs in rows ``lo`` to ``hi - 1``.
         new_columns : list of NewColumn
             Columns to add.
+        kept : (N,) bool, optional
+            Rows to write; all of them without.
         """
         rows = self.rows
         start = self.offset_of(rows)
@@ -107,7 +112,8 @@ class PlyTable:
                 block = block.copy()
                 for name, (where, values) in changed.items():
                     block[name][where] = replaced_cells(self.name, name, block[name][where], values, lo + where)
-            yield self._widened(block, lo, hi, new_columns)
+            written = self._widened(block, lo, hi, new_columns)
+            yield written if kept is None else written[kept[lo:hi]]
         yield self.body[start + rows.nbytes :]
 
     def _widened(self, block: NDArray, lo: int, hi: int, new_columns: list[NewColumn]) -> NDArray[np.uint8]:

@@ -1,6 +1,7 @@
 """Ascii PLY files: numbers are parsed, lines are kept."""
 
 import contextlib
+import itertools
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -40,7 +41,10 @@ class TextTable(PlyTable):
         return self.numbers if name == "vertex" else None
 
     def blocks(
-        self, changes: Callable[[int, int], CellChanges], new_columns: list[NewColumn]
+        self,
+        changes: Callable[[int, int], CellChanges],
+        new_columns: list[NewColumn],
+        kept: NDArray[np.bool_] | None = None,
     ) -> Iterator[NDArray[np.uint8] | bytes]:
         """Yield the text of the body with some numbers replaced; untouched numbers keep their digits."""
         starts = self.line_starts
@@ -48,8 +52,9 @@ class TextTable(PlyTable):
         for lo in range(0, self.n_rows, _BLOCK_ROWS):
             hi = min(lo + _BLOCK_ROWS, self.n_rows)
             changed = changes(lo, hi)
-            if changed or new_columns:
-                yield b"".join(self._lines(lo, hi, changed, new_columns))
+            if changed or new_columns or kept is not None:
+                lines = self._lines(lo, hi, changed, new_columns)
+                yield b"".join(lines if kept is None else itertools.compress(lines, kept[lo:hi]))
             else:
                 yield self.body[starts[lo] : starts[hi]]
         yield self.body[starts[-1] :]

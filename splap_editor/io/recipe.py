@@ -1,6 +1,5 @@
 """Recipes: an edit as JSON, for scripts and for the window alike."""
 
-import math
 import os
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,14 @@ from splap_editor.core.reach_options import CageOptions, ReachOptions
 from splap_editor.io.atomic_file import atomic_file
 from splap_editor.io.json_object import JsonObject, json_lines, parsed_json, shown
 from splap_editor.io.plain_edit import Edit, Handle, Pin, Vector
+from splap_editor.io.recipe_removal import (
+    PLACE_KEYS,
+    place_from_json,
+    place_to_json,
+    removal_from_json,
+    removal_to_json,
+    turn,
+)
 from splap_editor.io.regular_file import regular_bytes
 
 __all__ = [
@@ -52,7 +59,7 @@ def recipe_groups() -> tuple[tuple[str, type], ...]:
 def recipe_keys() -> tuple[str, ...]:
     """Keys that a recipe may have."""
     keys = [key for key, group in recipe_groups() for key in ([key] if key else options_of(group))]
-    return ("version", "preset", "method", "rows_of", "handles", "pins", *keys)
+    return ("version", "preset", "method", "rows_of", "handles", "pins", "remove", "place", *keys)
 
 
 class RecipeError(ValueError):
@@ -132,6 +139,8 @@ def recipe_from_json(value: Any) -> Edit:
         method=recipe.choice("method", tuple(method_titles()), Edit.method),
         options=OptionSet(*groups),
         rows_of=recipe.text("rows_of", ""),
+        remove=removal_from_json(recipe, "remove"),
+        place=place_from_json(recipe.object("place", PLACE_KEYS)),
     )
 
 
@@ -162,16 +171,8 @@ def _handle(handle: JsonObject, index: int) -> Handle:
 
 def pose_from_json(pose: JsonObject) -> Pose:
     """Pose of an object with the keys translate, rotate and scale, each at rest where it is missing."""
-    rotate = pose.vector("rotate", 4, Handle.rotate)
-    length = math.hypot(*rotate)
-    if not 0 < length < math.inf:
-        raise pose.refuse("rotate", "a quaternion w, x, y, z that is not zero")
-    if abs(length - 1) > 1e-12:
-        # Twice, since the length of very short ones is imprecise.
-        w, x, y, z = (part / length for part in rotate)
-        length = math.hypot(w, x, y, z)
-        rotate = (w / length, x / length, y / length, z / length)
-    return Pose(pose.vector("translate", 3, Handle.translate, most=LARGEST_COORDINATE), rotate, _scale(pose))
+    translate = pose.vector("translate", 3, Handle.translate, most=LARGEST_COORDINATE)
+    return Pose(translate, turn(pose, "rotate"), _scale(pose))
 
 
 def pose_to_json(pose: Pose) -> dict[str, Any]:
@@ -209,6 +210,9 @@ def recipe_to_json(recipe: Edit) -> dict[str, Any]:
     value["pins"] = [_without_defaults(pin, Pin()) for pin in recipe.pins]
     for (key, _), options in said.items():
         _put(value, key, options)
+    if recipe.remove:
+        value["remove"] = removal_to_json(recipe.remove)
+    _put(value, "place", place_to_json(recipe.place))
     return value
 
 

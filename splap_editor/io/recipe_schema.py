@@ -13,6 +13,7 @@ from splap_editor.core.pose import LARGEST_COORDINATE, SCALES
 from splap_editor.core.presets import PRESETS
 from splap_editor.core.reach_options import CageOptions
 from splap_editor.io.recipe import VERSION, recipe_groups
+from splap_editor.io.recipe_removal import place_schema, removal_schema
 
 _ROW = {"type": "integer", "minimum": 0, "exclusiveMaximum": 2**31}
 _PAIR = {"type": "array", "items": _ROW, "minItems": 2, "maxItems": 2, "uniqueItems": True}
@@ -43,6 +44,7 @@ def recipe_schema() -> dict[str, Any]:
     for key, group in recipe_groups():
         options = {name: _option(known) for name, known in options_of(group).items()}
         properties.update({key: _object(options)} if key else options)
+    properties |= {"remove": removal_schema(), "place": place_schema()}
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "SpLap recipe",

@@ -60,6 +60,9 @@ class SplatCells:
                 found, columns.sh_rest, before.transpose(0, 2, 1).reshape(flat), after.transpose(0, 2, 1).reshape(flat)
             )
         self._rotations(found, lo, hi)
+        if columns.filter_radius is not None:
+            before, after = self._both("filter_radii", lo, hi)
+            self._plain(found, (columns.filter_radius,), before[:, None], after[:, None])
         return found
 
     def _both(self, part: str, lo: int, hi: int) -> tuple[NDArray, NDArray]:

@@ -8,6 +8,7 @@ from typing import BinaryIO
 
 from numpy.typing import ArrayLike
 
+from splap_editor.core.index_spaces import FileMask
 from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.splats.splats import Splats
 from splap_editor.io.atomic_file import atomic_file
@@ -17,7 +18,7 @@ from splap_editor.io.formats.source import FormatError, Source
 from splap_editor.io.formats.table import FORMATS, GLANCE, SplatFormat, format_of, format_to_write
 from splap_editor.io.layout import PlyEvidence
 from splap_editor.io.layouts import LAYOUTS, layout_of
-from splap_editor.io.ply import SplatFile, read_ply, splat_file, write_ply
+from splap_editor.io.ply import SplatFile, kept_rows, read_ply, splat_file, write_ply
 
 __all__ = ["FormatError", "SplatFile", "losses_by_format", "losses_of_saving", "read_splats", "write_splats"]
 
@@ -98,6 +99,7 @@ def write_splats(
     file: SplatFile,
     splats: Splats,
     *,
+    removed: FileMask | None = None,
     as_3dgs: bool = False,
     extra: Mapping[str, ArrayLike] | None = None,
     progress: Progress = no_progress,
@@ -110,7 +112,7 @@ def write_splats(
 
     Parameters
     ----------
-    path, file, splats, as_3dgs, extra, progress
+    path, file, splats, removed, as_3dgs, extra, progress
         As of `write_ply`.
 
     Raises
@@ -120,12 +122,13 @@ def write_splats(
     """
     path = Path(path)
     row = format_to_write(path)
-    if row.is_lossless or (_is_kept(file, row) and splats is file.splats and not extra):
-        write_ply(path, file, splats, as_3dgs=as_3dgs, extra=extra, progress=progress)
+    if row.is_lossless or (_is_kept(file, row) and splats is file.splats and removed is None and not extra):
+        write_ply(path, file, splats, removed=removed, as_3dgs=as_3dgs, extra=extra, progress=progress)
         return
     if extra:
         raise FormatError(f"{path.name} cannot hold the columns {', '.join(extra)}. Save them in a PLY.")
-    bare, _ = bare_splats(splats, row.largest_degree)
+    kept = kept_rows(removed, file)
+    bare, _ = bare_splats(splats if kept is None else splats.at(kept), row.largest_degree)
 
     def encoded(out: BinaryIO) -> None:
         if _is_kept(file, row):

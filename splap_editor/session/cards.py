@@ -18,6 +18,7 @@ INERT_WORDS = {
     InertReason.NON_FINITE: "a number of it is not finite",
     InertReason.ZERO_QUATERNION: "its rotation is all zero",
     InertReason.ZERO_SIZE: "it has no size",
+    InertReason.REMOVED: "it is removed",
 }
 """Why a splat takes no part in the graph."""
 

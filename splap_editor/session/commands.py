@@ -1,6 +1,6 @@
 """The undoable steps: each a swap between a value before and a value after."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from splap_editor.core.handle_nodes import Region
 from splap_editor.core.index_spaces import FileMask
 from splap_editor.engine.edit import Edit
+from splap_editor.session.history import Command
 from splap_editor.session.scene import Scene
 
 EDIT_BYTES = 2048
@@ -34,7 +35,9 @@ class ChangeEdit:
             for region in _regions(edit)
             if region.rows is not None and id(region) not in shared
         )
-        return EDIT_BYTES + rows
+        removals = {id(edit.removal): edit.removal for edit in (self.before, self.after)}
+        removed = sum(removal.nbytes for removal in removals.values()) if len(removals) > 1 else 0
+        return EDIT_BYTES + rows + removed
 
     def do(self) -> None:
         """Put the changed edit in place."""
@@ -43,6 +46,29 @@ class ChangeEdit:
     def undo(self) -> None:
         """Put the edit from before back."""
         self.scene.set_edit(self.before)
+
+
+class ChangeTogether:
+    """Several changes as one step."""
+
+    def __init__(self, commands: Sequence[Command], label: str) -> None:
+        self.label = label
+        self._commands = tuple(commands)
+
+    @property
+    def nbytes(self) -> int:
+        """What they keep alive together."""
+        return sum(command.nbytes for command in self._commands)
+
+    def do(self) -> None:
+        """Put them in place one after the other."""
+        for command in self._commands:
+            command.do()
+
+    def undo(self) -> None:
+        """Take them back, the last one first."""
+        for command in reversed(self._commands):
+            command.undo()
 
 
 class ChangeMask:

@@ -33,7 +33,9 @@ class Scene:
         self.kernels: AdaptedKernels | None = None
         self.deformation: Deformation | None = None
         self.selection = np.zeros(file.splats.n_splats, bool)
+        self.shows_removed = False
         self.hidden = np.zeros(file.splats.n_splats, bool)
+        self._nothing = np.zeros(file.splats.n_splats, bool)
         self.selection_sets: Mapping[str, FileMask] = {}
         self.active_handles: tuple[int, ...] = ()
         self.active_pins: tuple[int, ...] = ()
@@ -46,6 +48,7 @@ class Scene:
         self.pose_changed = Signal()
         self.selection_changed = Signal()
         self.hidden_changed = Signal()
+        self.removed_changed = Signal()
         self.selection_sets_changed = Signal()
         self.active_handles_changed = Signal()
         self.pivot_changed = Signal()
@@ -64,6 +67,18 @@ class Scene:
         return self.surface
 
     @property
+    def removed(self) -> FileMask:
+        """(N,) splats that the edit leaves out. Never written to."""
+        removed = self.edit.removed
+        return self._nothing if removed is None else removed
+
+    @property
+    def unseen(self) -> FileMask:
+        """(N,) splats that are neither drawn nor picked: hidden, or removed while these are not shown."""
+        removed = None if self.shows_removed else self.edit.removed
+        return self.hidden if removed is None else self.hidden | removed
+
+    @property
     def shown_edit(self) -> Edit:
         """The edit on screen: a drag's preview while there is one."""
         return self.preview if self.preview is not None else self.edit
@@ -79,12 +94,15 @@ class Scene:
         return self.splats.means if self.kernels is None else self.kernels.means
 
     def set_surface(self, surface: Surface | None) -> None:
-        """Take the graph, Laplacian and kernel carriers, or none while they are made anew."""
+        """Take the graph, Laplacian and kernel carriers with their ellipses, or none while they are made anew."""
         self.surface = surface
+        if surface is not None:
+            self.ellipses = surface.ellipses
         self.surface_changed.emit()
 
     def set_edit(self, edit: Edit) -> None:
         """Replace the edit; the preview of a drag is dropped, and so is the choice of what is gone."""
+        was_removed = self.edit.removal
         self.edit = edit
         self.preview = None
         known = {handle.handle_id for handle in edit.handles}
@@ -92,6 +110,10 @@ class Scene:
         pins = {pin.pin_id for pin in edit.pins}
         kept_pins = tuple(pin_id for pin_id in self.active_pins if pin_id in pins)
         self.edit_changed.emit()
+        if not edit.removal.like(was_removed):
+            self.removed_changed.emit()
+            if not self.shows_removed and (self.selection & self.removed).any():
+                self.set_selection(self.selection & ~self.removed)
         self.set_active_handles(kept, kept_pins)
 
     def set_preview(self, edit: Edit | None) -> None:
@@ -114,6 +136,13 @@ class Scene:
         """Replace the (N,) mask of splats that are neither drawn nor picked."""
         self.hidden = hidden
         self.hidden_changed.emit()
+
+    def set_shows_removed(self, on: bool) -> None:
+        """Draw removed splats so that they can be selected; those that are not drawn are not selected either."""
+        self.shows_removed = on
+        self.removed_changed.emit()
+        if not on and (self.selection & self.removed).any():
+            self.set_selection(self.selection & ~self.removed)
 
     def set_selection_sets(self, sets: Mapping[str, FileMask]) -> None:
         """Replace the selections kept by name, each an (N,) mask."""

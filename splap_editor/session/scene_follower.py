@@ -18,6 +18,7 @@ class SceneHandlers(TypedDict, total=False):
     pose_changed: Handler
     selection_changed: Handler
     hidden_changed: Handler
+    removed_changed: Handler
     selection_sets_changed: Handler
     active_handles_changed: Handler
     pivot_changed: Handler

@@ -15,8 +15,9 @@ from splap_editor.engine.cache import StageCache
 from splap_editor.engine.edit import HANDLE_COLORS, Edit, Handle, Pin
 from splap_editor.engine.keyframes import auto_keyed_edit
 from splap_editor.engine.recipe_edit import edit_of, recipe_of, require_rows_fit, rows_of
+from splap_editor.engine.removal import Removal
 from splap_editor.io.recipe import read_recipe, write_recipe
-from splap_editor.session.commands import ChangeEdit, ChangeMask
+from splap_editor.session.commands import ChangeEdit, ChangeMask, ChangeTogether
 from splap_editor.session.depictor import Depictor, Unseen
 from splap_editor.session.history import History
 from splap_editor.session.jobs import Job, Post, Worker
@@ -159,10 +160,43 @@ class Session:
         self.history.push(ChangeEdit(scene, scene.edit, auto_keyed_edit(scene.edit, edit), label))
 
     def change_mask(self, name: str, mask: FileMask, label: str) -> None:
-        """Replace ``"selection"`` or ``"hidden"``, (N,) of file rows, as one undoable step; none if nothing changes."""
+        """Replace ``"selection"`` or ``"hidden"``, (N,) of file rows, as one undoable step; none if nothing changes.
+
+        What is removed is not selected unless it is shown.
+        """
         scene = self.shown_scene
+        if name == "selection" and scene.edit.removed is not None and not scene.shows_removed:
+            mask = mask & ~scene.removed
         if not np.array_equal(getattr(scene, name), mask):
             self.history.push(ChangeMask(scene, name, mask, label))
+
+    def change_removal(self, removal: Removal, label: str) -> int:
+        """Leave other splats out, as one undoable step that also selects what comes back, and else what stays selected.
+
+        Returns
+        -------
+        int
+            How many splats changed; without any there is no step.
+
+        Raises
+        ------
+        ValueError
+            Every splat would be left out.
+        """
+        scene = self.shown_scene
+        before = scene.removed
+        after = np.zeros_like(before) if removal.mask is None else removal.mask
+        changed = int(np.count_nonzero(before ^ after))
+        if not changed:
+            return 0
+        if after.all():
+            raise ValueError("that would remove every splat: keep at least one")
+        back = before & ~after
+        selection = back if back.any() else scene.selection & ~after
+        edit = auto_keyed_edit(scene.edit, replace(scene.edit, removal=removal))
+        commands = ChangeEdit(scene, scene.edit, edit, label), ChangeMask(scene, "selection", selection, label)
+        self.history.push(ChangeTogether(commands, label))
+        return changed
 
     def add_handle(self, region: Region, *, pose: Pose | None = None, name: str | None = None) -> Handle:
         """Place a handle, make it the active one, and prepare to move it."""

@@ -6,8 +6,9 @@ from typing import Any
 
 from splap_editor.engine.bound_edit import BoundEdit
 from splap_editor.engine.cache import StageCache
-from splap_editor.engine.edit import Edit, binds_like, poses_like
+from splap_editor.engine.edit import Edit, binds_like, poses_like, writes_like
 from splap_editor.engine.export_report import ExportReport
+from splap_editor.engine.removal import Removal
 from splap_editor.engine.surface import Surface
 from splap_editor.session.bound_edit import snapshot_of
 from splap_editor.session.depictor import Depictor, Unseen
@@ -113,8 +114,7 @@ class Ledger:
 
     @property
     def _is_exported(self) -> bool:
-        edit, exported = self.shown_scene.edit, self.exported or Edit()
-        return binds_like(edit, exported) and poses_like(edit, exported)
+        return writes_like(self.shown_scene.edit, self.exported or Edit())
 
     @property
     def state_at_rest(self) -> str:
@@ -178,7 +178,8 @@ class Stage:
 
 def _surface_request(ledger: Ledger) -> SurfaceRequest:
     scene = ledger.shown_scene
-    return SurfaceRequest(scene, scene.surface, scene.shown_edit.graph, ledger.cache)
+    edit = scene.shown_edit
+    return SurfaceRequest(scene, scene.surface, edit.graph, edit.removal, scene.ellipses, ledger.cache)
 
 
 def _bind_request(ledger: Ledger) -> BindRequest:
@@ -268,7 +269,12 @@ def _has_handles(ledger: Ledger) -> bool:
 
 def _is_prepared(ledger: Ledger) -> bool:
     scene = ledger.shown_scene
-    return scene.surface is not None and scene.surface.options == scene.shown_edit.graph
+    surface, edit = scene.surface, scene.shown_edit
+    return (
+        surface is not None
+        and surface.options == edit.graph
+        and edit.removal.like(Removal(mask=surface.ellipses.removed))
+    )
 
 
 def _is_bound(ledger: Ledger) -> bool:
@@ -299,7 +305,7 @@ STAGES = (
         state=lambda ledger: "preparing",
         cancels=("bind", "pose", "drag"),
         request=_surface_request,
-        serves=lambda a, b: a.scene is b.scene and a.options == b.options,
+        serves=lambda a, b: a.scene is b.scene and a.options == b.options and a.removal.like(b.removal),
         make=prepared_surface,
         take=_take_surface,
         fail=_give_up,

@@ -11,12 +11,13 @@ from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
 from splap_editor.core.deformer import Deformation
 from splap_editor.core.graph.splat_graph import GraphOptions
 from splap_editor.core.progress import Progress
-from splap_editor.core.splats.occupancy import occupancy_ellipses
+from splap_editor.core.splats.occupancy import Ellipses, occupancy_ellipses
 from splap_editor.engine.bound_edit import BoundEdit, Posed, bind, ready_for_drags
 from splap_editor.engine.cache import StageCache
 from splap_editor.engine.edit import Edit
 from splap_editor.engine.export_report import ExportReport
 from splap_editor.engine.quantities import Snapshot
+from splap_editor.engine.removal import Removal
 from splap_editor.engine.scripting import write_posed
 from splap_editor.engine.surface import Surface, surface_of
 from splap_editor.io.splat_files import SplatFile, read_splats
@@ -62,26 +63,36 @@ def opened_scene(job: Job, request: OpenRequest) -> OpenedScene:
     hand_over = request.depictor.depict(file.splats)
     if request.restore is not None:
         request.restore(scene)
+        if scene.edit.removed is not None:
+            scene.ellipses = occupancy_ellipses(file.splats, removed=scene.edit.removed)
     return OpenedScene(scene, hand_over)
 
 
 @dataclass(frozen=True, eq=False)
 class SurfaceRequest:
-    """What all handles of a scene share, wanted with these options; mends go on from the scene's last surface."""
+    """What all handles of a scene share, wanted with these options; mends go on from the scene's last surface.
+
+    The ellipses serve if they are of the splats that the removal leaves.
+    """
 
     scene: Scene
     near: Surface | None
     options: GraphOptions
+    removal: Removal
+    ellipses: Ellipses
     cache: StageCache | None
 
 
 def prepared_surface(job: Job, request: SurfaceRequest) -> Surface:
     """Build everything that handles of a scene share, a drag's coarse model included."""
-    scene = request.scene
+    scene, removal, ellipses = request.scene, request.removal, request.ellipses
+    if not removal.like(Removal(mask=ellipses.removed)):
+        job.report(0.0, "occupancy")
+        ellipses = occupancy_ellipses(scene.splats, removed=removal.mask)
     surface = surface_of(
         scene.splats,
         request.options,
-        ellipses=scene.ellipses,
+        ellipses=ellipses,
         cache=request.cache,
         stages=job.progress,
         near=request.near,
@@ -215,6 +226,7 @@ def exported_file(job: Job, request: ExportRequest) -> ExportReport:
         order.path,
         request.file,
         request.kernels,
+        request.edit,
         columns=order.columns,
         snapshot=request.snapshot,
         as_3dgs=order.as_3dgs,

@@ -32,6 +32,7 @@ from splap_editor.ui.actions.handle_actions import HandleActions
 from splap_editor.ui.actions.menus import fill_menu_bar
 from splap_editor.ui.actions.pose_actions import PoseActions
 from splap_editor.ui.actions.program_actions import ProgramActions
+from splap_editor.ui.actions.removal_actions import RemovalActions
 from splap_editor.ui.actions.select_actions import SelectActions
 from splap_editor.ui.actions.selection_sets_menu import SelectionSetsMenu
 from splap_editor.ui.actions.timeline_actions import TimelineActions
@@ -65,6 +66,9 @@ CONTEXT_MENU = (
     "",
     "handle.reset",
     "handle.delete",
+    "",
+    "remove.selected",
+    "remove.others",
     "",
     "select.hide",
     "select.isolate",
@@ -156,6 +160,7 @@ class MainWindow(FileDrop, QMainWindow):
             self._on_scene_changed,
             selection_changed=self._refresh,
             hidden_changed=self._refresh,
+            removed_changed=self._on_removed_changed,
             active_handles_changed=self._refresh,
             pivot_changed=self._show_pivot,
             surface_changed=self._refresh,
@@ -183,6 +188,7 @@ class MainWindow(FileDrop, QMainWindow):
 
     def _actions(self) -> ActionSet:
         session, view, tools = self.session, self.view, self.tools
+        handles = HandleActions(session, view.viewport)
         through = tools.context.held(SelectOptions)
         through.changed.connect(lambda: self.actions_.check("select.through", through.value.through))
         saving = DocumentActions(self, session, self.documents, self.autosave, view.viewport, self.display, self.toast)
@@ -205,7 +211,8 @@ class MainWindow(FileDrop, QMainWindow):
                 self.selection_sets,
                 EditActions(session, tools),
                 SelectActions(session, through),
-                HandleActions(session, view.viewport),
+                handles,
+                RemovalActions(session, handles, self.toast),
                 DisplayActions(self.display),
                 self.inspection.graph_actions,
                 self.view_actions,
@@ -303,6 +310,7 @@ class MainWindow(FileDrop, QMainWindow):
         self._show_pivot()
         up = tuple(self.view.viewport.camera.world_up)
         self.actions_.check({(0.0, 0.0, 1.0): "view.up_z", (0.0, -1.0, 0.0): "view.down_y"}.get(up, "view.up_y"))
+        self.actions_.check("remove.show", False)
         self.display.apply(self.view)
         self.overlay.show_hint(*(() if self._has_hinted else HINT))
         self._refresh()
@@ -315,6 +323,10 @@ class MainWindow(FileDrop, QMainWindow):
     def _on_failed(self, title: str, error: Exception) -> None:
         if self.session.scene is None:
             self.overlay.show_hint("Drop a splat PLY here, or press Ctrl+O.")
+
+    def _on_removed_changed(self) -> None:
+        self.actions_.check("remove.show", self.session.shown_scene.shows_removed)
+        self._refresh()
 
     def _on_edit_changed(self) -> None:
         edit = self.session.shown_scene.edit

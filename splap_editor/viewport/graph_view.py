@@ -118,6 +118,7 @@ class GraphView:
             self._on_scene_changed,
             surface_changed=self._update,
             hidden_changed=self._update,
+            removed_changed=self._update,
             selection_changed=self._on_selection_changed,
             picked_changed=self._on_selection_changed,
         )
@@ -166,7 +167,7 @@ class GraphView:
         self.rows = np.empty((0, 2), np.int64)
         made = self.colored
         if scene is not None and made is not None and made.surface is scene.surface and self.options.shown != "off":
-            wanted = ~scene.hidden[made.rows].any(axis=1)
+            wanted = ~scene.unseen[made.rows].any(axis=1)
             if self.options.shown == "near":
                 around = scene.selection.copy()
                 if scene.picked is not None:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.index_spaces import FileMask, FileRow
-from splap_editor.engine.quantities import QUANTITIES, Quantity, Snapshot, missing
+from splap_editor.engine.quantities import QUANTITIES, Quantity, Snapshot, missing, values_of
 from splap_editor.session.bound_edit import snapshot_of
 from splap_editor.session.jobs import Job
 from splap_editor.session.latest_job import LatestJob
@@ -93,7 +93,7 @@ class ShownQuantity:
 def shown_quantity(options: QuantityOptions, snapshot: Snapshot) -> ShownQuantity:
     """Work out a quantity, its range, histogram and colours; for the worker."""
     quantity = QUANTITIES[options.name]
-    values = quantity.values(snapshot)
+    values = values_of(quantity, snapshot)
     known = values[np.isfinite(values)]
     is_log = options.is_log and not quantity.is_label
     counted = known[known > 0.0] if is_log else known

@@ -30,6 +30,7 @@ from splap_editor.viewport.tints import edit_tints, fixed_tint, pin_rows, rgb
 from splap_editor.viewport.viewport import Viewport
 from splap_editor.viewport.weight_view import WeightView
 
+REMOVED_TINT = (229, 72, 77, 190)
 FREE_RING_COLOR = (0.75, 0.77, 0.82)
 
 
@@ -139,6 +140,8 @@ class SceneView:
             pose_changed=self._show_pose,
             selection_changed=self._show_flags,
             hidden_changed=self._show_flags,
+            removed_changed=self._show_removed,
+            surface_changed=self._show_subject,
             edit_changed=self._show_handles,
             preview_changed=self._show_handles,
             active_handles_changed=self._show_handles,
@@ -263,6 +266,7 @@ class SceneView:
         depicted = self._depicted
         assert depicted is not None
         self.viewport.splats.load(depicted.rest, depicted.colors, scene.ellipses.subject)
+        self.viewport.splats.set_subject(scene.ellipses.subject, scene.edit.removed)
         self.viewport.camera.world_up = np.array(self.preferred_up or suggested_up(scene.splats), np.float64)
         self.viewport.reset_camera()
         self._show_flags()
@@ -295,8 +299,21 @@ class SceneView:
         if scene is None:
             return
         flags = np.where(scene.selection, np.uint8(SplatFlag.SELECTED), np.uint8(0))
-        flags |= np.where(scene.hidden, np.uint8(SplatFlag.HIDDEN), np.uint8(0))
+        flags |= np.where(scene.unseen, np.uint8(SplatFlag.HIDDEN), np.uint8(0))
         self.viewport.splats.set_flags(flags)
+
+    def _show_removed(self) -> None:
+        """Take removed splats out of the picture, or tint them in it."""
+        self._show_flags()
+        self._show_subject()
+        self._tinted_for = ("stale",)
+        self._show_tints()
+
+    def _show_subject(self) -> None:
+        """Have home, framing and clipping follow the subject of the splats that are left."""
+        scene = self._shown
+        if scene is not None:
+            self.viewport.splats.set_subject(scene.ellipses.subject, scene.edit.removed)
 
     def _show_handles(self) -> None:
         scene, viewport = self._shown, self.viewport
@@ -338,7 +355,8 @@ class SceneView:
         if wanted == self._tinted_for:
             return
         self._tinted_for = wanted
-        if not wanted and not self._marks:
+        shows_removed = scene.shows_removed and scene.edit.removed is not None
+        if not wanted and not self._marks and not shows_removed:
             self.viewport.splats.set_tints(None)
             return
         if paint is not None:
@@ -348,8 +366,10 @@ class SceneView:
             tints = edit_tints(scene, bound if is_known else None, fixed)
         else:
             tints = np.zeros((scene.splats.n_splats, 4), np.uint8)
-        if self._marks:
+        if self._marks or shows_removed:
             tints = tints.copy()
+            if shows_removed:
+                tints[scene.removed] = REMOVED_TINT
             for marked, rgba in self._marks:
                 tints[marked] = rgba
         self.viewport.splats.set_tints(tints)

@@ -11,7 +11,7 @@ from vtkmodules.vtkCommonCore import VTK_INT, vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkDataObject, vtkPolyData
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
-from splap_editor.core.index_spaces import FileRows, RowsByPlace
+from splap_editor.core.index_spaces import FileMask, FileRows, RowsByPlace
 from splap_editor.core.splats.main_subject import MainSubject
 from splap_editor.core.twofold_loop import TwofoldLoop
 from splap_editor.resources import shader
@@ -146,7 +146,7 @@ class SplatActor:
         self.shape[:, 1] = glyphs.cutoffs
         reaches = np.linalg.norm(np.hstack([glyphs.axes_u, glyphs.axes_v]), axis=1) * glyphs.cutoffs
         self.reach = float(np.median(reaches)) if n else 0.0
-        self.extent = max(2.0 * float(np.linalg.norm(subject.half_axes)) + 2.0 * self.reach, 1e-9)
+        self.set_subject(subject)
         self._room = float(reaches.max(initial=0.0)) + 1e-6 * self.extent
         self.set_geometry(glyphs.means, glyphs.axes_u, glyphs.axes_v, glyphs.thickness)
         self.set_colors(colors)
@@ -291,9 +291,15 @@ class SplatActor:
         twin.look = replace(self._look, point_size_px=self._look.point_size_px * size_in_pixels)
         return twin
 
+    def set_subject(self, subject: MainSubject, removed: FileMask | None = None) -> None:
+        """Take another subject as the size of the scene, and leave removed splats (N,) out of its bounds."""
+        self.subject = subject
+        self.extent = max(2.0 * float(np.linalg.norm(subject.half_axes)) + 2.0 * self.reach, 1e-9)
+        self._counted = None if removed is None or removed.all() else np.flatnonzero(~removed)
+
     def bounds(self) -> NDArray[np.float64]:
-        """(2, 3) box around all splats, world units, with room for their size at rest."""
-        low, high = _box(self.means)
+        """(2, 3) box around all splats that are not removed, world units, with room for their size at rest."""
+        low, high = _box(self.means if self._counted is None else self.means[self._counted])
         return np.array([low - self._room, high + self._room]) + self.origin
 
     # Inside -------------------------------------------------------------------------------------------------------

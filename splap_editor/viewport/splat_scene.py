@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from vtkmodules.vtkRenderingCore import vtkRenderer
 
-from splap_editor.core.index_spaces import FileRows, RowsByPlace
+from splap_editor.core.index_spaces import FileMask, FileRows, RowsByPlace
 from splap_editor.core.splats.main_subject import MainSubject, main_subject
 from splap_editor.viewport.depth_order import depth_order
 from splap_editor.viewport.edge_lines import EdgeLines
@@ -63,6 +63,7 @@ class SplatScene:
         self._original: SplatActor | None = None
         self._rest: Glyphs | None = None
         self._subject_rows = np.empty(0, np.int64)
+        self._removed: FileMask | None = None
         self._flags = np.zeros(0, np.uint8)
         self._highlighted: FileRows | None = None
         self._looks = dict(DEFAULT_LOOKS)
@@ -81,7 +82,7 @@ class SplatScene:
         self.clear()
         if not len(glyphs.means):
             return
-        self._rest = glyphs
+        self._rest, self._removed = glyphs, None
         subject = subject or main_subject(glyphs.means, np.asarray(colors[:, 3], np.float64) / 255.0)
         self.deformed = SplatActor(glyphs, colors, subject)
         self._subject_rows = np.flatnonzero(subject.holds(glyphs.means, room=self.deformed.reach))
@@ -90,6 +91,17 @@ class SplatScene:
         self.edges = EdgeLines(self.deformed, self._renderer)
         self._needs_order = True
         self._apply_looks()
+
+    def set_subject(self, subject: MainSubject, removed: FileMask | None) -> None:
+        """Frame and clip by another subject of the same scene, and without the splats that are removed (N,)."""
+        if self.deformed is None or self._rest is None:
+            return
+        self._subject_rows = np.flatnonzero(subject.holds(self._rest.means, room=self.deformed.reach))
+        for actor in (self.deformed, self._original):
+            if actor is not None:
+                actor.set_subject(subject, removed)
+        self._removed = removed
+        self.request_render()
 
     def clear(self) -> None:
         """Show no scene."""
@@ -212,6 +224,7 @@ class SplatScene:
         is_both = self._compare is Compare.BOTH
         if self._compare is not Compare.DEFORMED and self._original is None:
             self._original = SplatActor(self._rest, self.deformed.base_colors, self.deformed.subject)
+            self._original.set_subject(self.deformed.subject, self._removed)
             self._original.set_flags(self._flags)
             # Blended actors are drawn in the order they were added: the ghost first, under the deformed splats.
             self._renderer.RemoveActor(self.deformed.actor)

@@ -6,6 +6,7 @@ from vtkmodules.vtkRenderingCore import vtkRenderWindow
 
 from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
 from splap_editor.core.index_spaces import FileMask
+from splap_editor.core.splats.main_subject import main_subject
 from splap_editor.core.splats.spherical_harmonics import view_colors
 from splap_editor.core.splats.splats import Splats
 from splap_editor.viewport.camera import View, orbited
@@ -28,11 +29,20 @@ class Studio:
     width, height : int
         Size of the pictures in pixels.
     hidden : (N,) bool, optional
-        Splats that are left out.
+        Splats that are left out of the picture.
+    removed : (N,) bool, optional
+        Splats that are left out of the scene, its size included.
     """
 
     def __init__(
-        self, splats: Splats, look: SplatLook, width: int, height: int, *, hidden: FileMask | None = None
+        self,
+        splats: Splats,
+        look: SplatLook,
+        width: int,
+        height: int,
+        *,
+        hidden: FileMask | None = None,
+        removed: FileMask | None = None,
     ) -> None:
         self._splats = splats
         self._size = width, height
@@ -41,7 +51,13 @@ class Studio:
         self._window.SetSize(width, height)
         self.viewport = Viewport(self._window)
         self._rest = splat_glyphs(splats)
-        self.viewport.splats.load(self._rest, base_colors(splats))
+        subject = None
+        if removed is not None:
+            subject = main_subject(np.asarray(splats.means)[~removed], splats.opacities[~removed])
+            hidden = removed if hidden is None else hidden | removed
+        self.viewport.splats.load(self._rest, base_colors(splats), subject)
+        if subject is not None:
+            self.viewport.splats.set_subject(subject, removed)
         if hidden is not None and hidden.any():
             self.viewport.splats.set_flags(np.where(hidden, np.uint8(SplatFlag.HIDDEN), np.uint8(0)))
         self.viewport.splats.look = look

@@ -301,6 +301,7 @@ def test_a_handle_of_no_splats_is_refused(splats, handle):
 
 def test_columns_without_a_surface_are_refused(tmp_path):
     file = read_ply(resource("samples", "tube.ply"))
-    with pytest.raises(ValueError, match="columns need the surface of the scene"):
-        write_posed(tmp_path / "out.ply", file, posed_file(file, Edit()), columns=("size",))
-    write_posed(tmp_path / "out.ply", file, posed_file(file, Edit(), with_surface=True), columns=("size",))
+    with pytest.raises(ValueError, match="columns need the snapshot"):
+        write_posed(tmp_path / "out.ply", file, None, Edit(), columns=("size",))
+    made = posed_file(file, Edit(), with_surface=True)
+    write_posed(tmp_path / "out.ply", file, made.kernels, made.edit, columns=("size",), snapshot=made.snapshot)

@@ -263,3 +263,33 @@ def test_a_file_may_be_written_onto_itself(tmp_path):
     np.testing.assert_allclose(read_ply(tmp_path / "in.ply").splats.means, splats.means, rtol=1e-6)  # float32
     write_ply(tmp_path / "in.ply", file, file.splats)
     assert (tmp_path / "in.ply").read_bytes() == data
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_removed_rows_are_left_out_and_all_other_bytes_stay(seed, tmp_path):
+    """Of each column, of other elements and of the header, in every format."""
+    columns, data = random_file(seed)
+    (tmp_path / "in.ply").write_bytes(data)
+    file = read_ply(tmp_path / "in.ply")
+    n = file.splats.n_splats
+    removed = np.random.default_rng(seed).random(n) < 0.5
+    removed[0] = False
+    write_ply(tmp_path / "out.ply", file, file.splats, removed=removed)
+    written = read_ply(tmp_path / "out.ply")
+    for name in columns:
+        assert written.table.columns[name].tobytes() == file.table.columns[name][~removed].tobytes()
+    count = f"element vertex {n}".encode(), f"element vertex {(~removed).sum()}".encode()
+    assert written.table.header.raw == file.table.header.raw.replace(*count)
+    whole, less = ([bytes(block) for block in held.table.blocks(lambda lo, hi: {}, [])] for held in (file, written))
+    # What stands before and after the rows of the vertices: other elements.
+    assert (whole[0], whole[-1]) == (less[0], less[-1])
+
+
+def test_compressed_splats_of_which_some_are_removed_become_plain_ones(tmp_path):
+    (tmp_path / "in.ply").write_bytes(compressed_bytes(splat_columns(600, np.random.default_rng(0), n_scales=3)))
+    file = read_ply(tmp_path / "in.ply")
+    removed = np.arange(file.splats.n_splats) % 3 == 1
+    write_ply(tmp_path / "out.ply", file, file.splats, removed=removed)
+    written = read_ply(tmp_path / "out.ply").splats
+    for part in ("means", "log_scales", "quats", "logit_opacities", "sh0", "shN"):
+        np.testing.assert_array_equal(getattr(written, part), getattr(file.splats, part)[~removed])

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from splap_editor.core.graph.splat_graph import SplatGraph
 from splap_editor.core.index_spaces import RowsByPlace
 from splap_editor.core.progress import Progress, no_progress
-from splap_editor.core.splats.occupancy import Ellipses
+from splap_editor.core.splats.occupancy import Ellipses, InertReason
 from splap_editor.core.splats.rotations import quats_to_matrices
 from splap_editor.core.splats.splats import Splats
 from splap_editor.core.surface.geodesics import Neighborhoods
@@ -151,6 +151,8 @@ class KernelBinding:
         self.inert_weights = np.zeros((len(means), k))
         # A centre that is nowhere is near nothing: its weights stay zero, which leaves it as it is.
         finite = np.isfinite(means).all(axis=1)
+        # Nor is one that is left out carried anywhere.
+        finite &= self.ellipses.inert[self.ellipses.node_of_row < 0] != InertReason.REMOVED
         if k and finite.any():
             distances, carriers = cKDTree(self.ellipses.centers).query(means[finite], k)
             self.inert_carriers[finite] = carriers.reshape(-1, k)

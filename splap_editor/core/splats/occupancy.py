@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.index_spaces import FileRows, Nodes
+from splap_editor.core.index_spaces import FileMask, FileRows, Nodes
 from splap_editor.core.splats.main_subject import MainSubject, main_subject
 from splap_editor.core.splats.morton import morton_order
 from splap_editor.core.splats.rotations import quats_to_matrices
@@ -37,6 +37,8 @@ class InertReason(IntEnum):
     """Its rotation is undefined."""
     ZERO_SIZE = 5
     """Both in-plane scales are zero."""
+    REMOVED = 6
+    """The edit leaves it out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,12 +100,20 @@ class Ellipses:
         return nodes
 
     @cached_property
+    def removed(self) -> FileMask | None:
+        """(N,) what the edit leaves out; None where it leaves out nothing."""
+        removed = self.inert == InertReason.REMOVED
+        return removed if removed.any() else None
+
+    @cached_property
     def reaches(self) -> NDArray[np.float64]:
         """(n,) major semi-axis in world units."""
         return np.sqrt(np.einsum("ij,ij->i", self.semi_axes[:, 0], self.semi_axes[:, 0]))
 
 
-def occupancy_ellipses(splats: Splats, *, min_contribution: float = MIN_CONTRIBUTION) -> Ellipses:
+def occupancy_ellipses(
+    splats: Splats, *, min_contribution: float = MIN_CONTRIBUTION, removed: FileMask | None = None
+) -> Ellipses:
     """Ellipses on which the splats contribute visibly.
 
     A kernel counts where it exceeds ``max(V, c / α)``, an ellipse with
@@ -116,6 +126,8 @@ def occupancy_ellipses(splats: Splats, *, min_contribution: float = MIN_CONTRIBU
         The scene, in file order.
     min_contribution : float
         Least visible contribution c, in (0, 1).
+    removed : (N,) bool, optional
+        Splats that are left out: they are inert, and the subject is found without them.
 
     Returns
     -------
@@ -142,6 +154,8 @@ def occupancy_ellipses(splats: Splats, *, min_contribution: float = MIN_CONTRIBU
         thresholds = np.zeros(splats.n_splats) if splats.thresholds is None else np.abs(splats.thresholds)
         levels = np.maximum(thresholds.astype(np.float64), min_contribution / opacities)
         inert = _inert_reasons(splats, sigmas, opacities, thresholds, min_contribution)
+        if removed is not None:
+            inert[removed] = InertReason.REMOVED
         rows = np.flatnonzero(inert == InertReason.ACTIVE)
         rows = rows[morton_order(np.asarray(splats.means[rows], np.float64))]
     centers = np.ascontiguousarray(splats.means[rows], np.float64)

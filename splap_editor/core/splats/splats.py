@@ -1,7 +1,8 @@
 """Gaussian splats as their file holds them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,6 +66,12 @@ class Splats:
     def sh_degree(self) -> int:
         """Spherical-harmonic degree, 0 to 4."""
         return round((self.shN.shape[1] + 1) ** 0.5) - 1
+
+    def at(self, rows: NDArray[np.bool_]) -> "Splats":
+        """Splats of some rows, by a mask (N,), as copies."""
+        held: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
+        taken: dict[str, Any] = {name: part[rows] for name, part in held.items() if isinstance(part, np.ndarray)}
+        return replace(self, **taken)
 
     @cached_property
     def scales(self) -> NDArray[np.float64]:

@@ -71,6 +71,21 @@ def has_hidden(state: State) -> bool:
     return state.scene is not None and bool(state.scene.hidden.any())
 
 
+def has_removed(state: State) -> bool:
+    """Splats are removed."""
+    return state.scene is not None and state.scene.edit.removed is not None
+
+
+def has_removed_selected(state: State) -> bool:
+    """Splats that are removed are selected."""
+    return state.scene is not None and has_removed(state) and bool((state.scene.selection & state.scene.removed).any())
+
+
+def can_delete(state: State) -> bool:
+    """Handles or pins are chosen, or splats selected."""
+    return has_chosen(state) or has_selection(state)
+
+
 def has_weights(state: State) -> bool:
     """Handles have weights to be shown."""
     return state.scene is not None and has_handles(state) and state.scene.edit.deformer.has_weights

@@ -234,7 +234,6 @@ EDIT_TABLE: tuple[ActionSpec, ...] = (
         "handle.delete",
         HandleActions.delete,
         "&Delete",
-        ("Delete", "Backspace"),
         icon="trash",
         tip="Delete the chosen handles and pins.",
         needs=has_chosen,

@@ -24,7 +24,7 @@ class SelectActions:
 
     def all(self) -> None:
         """Select every splat that is not hidden."""
-        self._select(~self._scene.hidden, "Select all")
+        self._select(~self._scene.unseen, "Select all")
 
     def none(self) -> None:
         """Select nothing."""
@@ -32,7 +32,7 @@ class SelectActions:
 
     def invert(self) -> None:
         """Swap selected and unselected among the visible."""
-        self._select(~self._scene.selection & ~self._scene.hidden, "Invert selection")
+        self._select(~self._scene.selection & ~self._scene.unseen, "Invert selection")
 
     def grow(self) -> None:
         """Add the neighbours on the surface."""

@@ -57,7 +57,7 @@ class ViewActions(QObject):
     def frame_selection(self) -> None:
         """Fly to the selection, else to the chosen handles and pins, else to the main subject."""
         scene = self._session.shown_scene
-        rows: FileRows = np.flatnonzero(scene.selection & ~scene.hidden)
+        rows: FileRows = np.flatnonzero(scene.selection & ~scene.unseen)
         if not len(rows):
             held = (self._view.rows_of_handles(scene.active_handles), self._view.rows_of_pins(scene.active_pins))
             rows = np.concatenate(held)

@@ -138,4 +138,4 @@ class QuantityPanel(QWidget):
     def _combined(self, before: FileMask, low: float, high: float, mode: SelectionMode) -> FileMask:
         shown = self._view.shown
         assert shown is not None  # who picks sees its bars
-        return combined_selection(before, shown.within(low, high) & ~self._session.shown_scene.hidden, mode)
+        return combined_selection(before, shown.within(low, high) & ~self._session.shown_scene.unseen, mode)

@@ -14,6 +14,7 @@ from splap_editor.engine.edit import binds_like
 from splap_editor.engine.frames import FramePoser, frame_path, frame_poser, write_frames, write_pictures
 from splap_editor.io.png import write_png
 from splap_editor.session.jobs import Job
+from splap_editor.session.scene import Scene
 from splap_editor.session.session import Session
 from splap_editor.session.side_by_side import side_by_side
 from splap_editor.viewport.camera import View
@@ -76,7 +77,7 @@ def submit_frames(
     file, edit, surface, cache = scene.file, scene.edit, scene.surface, session.cache
     n_threads = session.n_threads
     serves = bound is not None and binds_like(bound.edit, edit)
-    desk = _Desk(scene.splats, viewport, order, scene.hidden) if order.kind != "ply" else None
+    desk = _Desk(scene.splats, viewport, order, scene) if order.kind != "ply" else None
 
     def poser(job: Job) -> FramePoser:
         if serves and edit.active_handles:
@@ -120,11 +121,12 @@ def submit_frames(
 class _Desk:
     """A studio of the main thread, asked for pictures by the worker."""
 
-    def __init__(self, splats: Splats, viewport: Viewport, order: FrameOrder, hidden: NDArray[np.bool_]) -> None:
+    def __init__(self, splats: Splats, viewport: Viewport, order: FrameOrder, scene: Scene) -> None:
         self.view = viewport.camera.view
         self.world_up = np.array(viewport.camera.world_up)
         self._is_transparent = order.is_transparent
-        self._splats, self._hidden, self._size = splats, hidden, order.size
+        self._splats, self._hidden, self._size = splats, scene.hidden, order.size
+        self._removed = scene.edit.removed
         self._look = viewport.splats.look
         shown = viewport.renderer
         bottom = shown.GetBackground()
@@ -159,7 +161,7 @@ class _Desk:
 
     def _draw(self, kernels: AdaptedKernels | None, view: View) -> NDArray[np.uint8]:
         if self._studio is None:
-            self._studio = Studio(self._splats, self._look, *self._size, hidden=self._hidden)
+            self._studio = Studio(self._splats, self._look, *self._size, hidden=self._hidden, removed=self._removed)
             self._studio.viewport.set_background(*self._background)
         self._studio.pose(kernels)
         return self._studio.picture(view, is_transparent=self._is_transparent)

@@ -24,7 +24,13 @@ class StateLine(QWidget):
         layout.setSpacing(6 * STEP)
         layout.addWidget(self.hint)
         layout.addWidget(self.counts)
-        SceneFollower(session, self._show_counts, selection_changed=self._show_counts, hidden_changed=self._show_counts)
+        SceneFollower(
+            session,
+            self._show_counts,
+            selection_changed=self._show_counts,
+            hidden_changed=self._show_counts,
+            removed_changed=self._show_counts,
+        )
         tools.hint_changed.connect(self.show_hint)
         self.show_hint()
 
@@ -37,10 +43,13 @@ class StateLine(QWidget):
         if scene is None:
             self.counts.setText("")
             return
-        words = [f"{scene.splats.n_splats:,} splats"]
-        n_selected, n_hidden = int(scene.selection.sum()), int(scene.hidden.sum())
+        n_removed = scene.edit.removal.n_removed
+        words = [f"{scene.splats.n_splats - n_removed:,} splats"]
+        n_selected, n_hidden = int(scene.selection.sum()), int((scene.hidden & ~scene.removed).sum())
         if n_selected:
             words.insert(0, f"{n_selected:,} selected of")
         if n_hidden:
             words.append(f"· {n_hidden:,} hidden")
+        if n_removed:
+            words.append(f"· {n_removed:,} removed")
         self.counts.setText(" ".join(words))

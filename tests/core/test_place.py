@@ -1,0 +1,68 @@
+"""Laws of the place of a whole scene."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from splap_editor.core.place import Place, placed_points, placed_splats
+from splap_editor.core.splats.rotations import quats_to_matrices
+from splap_editor.core.splats.spherical_harmonics import view_colors
+from splap_editor.core.splats.splats import Splats
+
+QUAT = tuple((np.array([0.8, 0.2, -0.4, 0.4]) / np.linalg.norm([0.8, 0.2, -0.4, 0.4])).tolist())
+PLACE = Place((0.3, -0.1, 0.2), (1.0, 2.0, -0.5), QUAT, 2.5)
+
+
+def splats(n_scales=3, n=40):
+    rng = np.random.default_rng(0)
+    return Splats(
+        rng.normal(size=(n, 3)),
+        rng.normal(-3.0, 0.5, (n, n_scales)),
+        rng.normal(size=(n, 4)),
+        rng.normal(size=n),
+        rng.normal(size=(n, 3)),
+        rng.normal(0.0, 0.2, (n, 8, 3)),
+    )
+
+
+def covariances(held):
+    axes = quats_to_matrices(held.quats)[:, :, : held.n_scales] * np.exp(held.log_scales)[:, None, :]
+    return axes @ axes.swapaxes(1, 2)
+
+
+@pytest.mark.parametrize("n_scales", [2, 3])
+def test_positions_and_covariances_follow_the_matrix_and_the_scales_stay_as_many(n_scales):
+    rest = splats(n_scales)
+    placed = placed_splats(rest, PLACE)
+    M = PLACE.matrix
+    np.testing.assert_allclose(placed.means, rest.means @ M[:3, :3].T + M[:3, 3], atol=1e-12)
+    np.testing.assert_allclose(covariances(placed), M[:3, :3] @ covariances(rest) @ M[:3, :3].T, atol=1e-12)
+    assert placed.n_scales == n_scales
+
+
+def test_colour_turns_with_the_scene():
+    rest = splats()
+    placed, eye = placed_splats(rest, PLACE), np.array([4.0, 3.0, 2.0])
+    eyes = np.broadcast_to(np.eye(3), (rest.n_splats, 3, 3))
+    there = view_colors(*_floats(placed), eyes, placed_points(eye[None], PLACE)[0])
+    np.testing.assert_allclose(there, view_colors(*_floats(rest), eyes, eye), atol=2e-5)
+
+
+def _floats(held):
+    return tuple(np.ascontiguousarray(part, np.float32) for part in (held.sh0, held.shN, held.means))
+
+
+def test_a_place_at_rest_gives_the_same_splats_and_its_centre_says_nothing_then():
+    rest = splats()
+    assert placed_splats(rest, Place(center=(1.0, 2.0, 3.0))) is rest
+
+
+def test_a_place_goes_on_by_a_further_similarity():
+    delta = Place((0.0, 1.0, 0.0), (0.5, 0.0, 0.0), (0.6, 0.0, 0.8, 0.0), 0.5).matrix
+    np.testing.assert_allclose(PLACE.followed_by(delta).matrix, delta @ PLACE.matrix, atol=1e-12)
+
+
+def test_the_filter_grows_with_the_scene():
+    rest = replace(splats(), filter_radii=np.full(40, 0.01))
+    np.testing.assert_allclose(placed_splats(rest, PLACE).scales, 2.5 * rest.scales)
