@@ -21,10 +21,8 @@ __all__ = [
     "prepare",
     "read_ply",
     "read_recipe",
-    "read_splats",
     "write_ply",
     "write_recipe",
-    "write_splats",
 ]
 
 TYPE_CHECKING = False
@@ -36,7 +34,6 @@ if TYPE_CHECKING:
     from splap_editor.io.plain_edit import Edit, Handle, Pin
     from splap_editor.io.ply import read_ply, write_ply
     from splap_editor.io.recipe import read_recipe, write_recipe
-    from splap_editor.io.splat_files import read_splats, write_splats
 
 _PLACES = {
     "Edit": "io.plain_edit",
@@ -49,10 +46,8 @@ _PLACES = {
     "prepare": "engine.scripting",
     "read_ply": "io.ply",
     "read_recipe": "io.recipe",
-    "read_splats": "io.splat_files",
     "write_ply": "io.ply",
     "write_recipe": "io.recipe",
-    "write_splats": "io.splat_files",
 }
 
 

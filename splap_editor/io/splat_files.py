@@ -94,6 +94,12 @@ def losses_by_format(file: SplatFile) -> dict[str, list[str]]:
     return {row.suffixes[0]: losses_of_saving(file, row) for row in rows}
 
 
+def name_filter(*, to_write: bool = False) -> str:
+    """Endings of all formats for a file dialog: ``"*.ply *.spz …"``."""
+    rows = [row for row in FORMATS.values() if row.can_be_written or not to_write]
+    return " ".join(f"*{suffix}" for row in rows for suffix in row.suffixes)
+
+
 def write_splats(
     path: str | os.PathLike[str],
     file: SplatFile,

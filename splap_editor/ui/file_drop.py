@@ -4,6 +4,7 @@ from pathlib import Path
 
 from PySide6.QtGui import QDragEnterEvent, QDragLeaveEvent, QDropEvent
 
+from splap_editor.io.formats.table import format_named
 from splap_editor.ui.actions.file_actions import FileActions
 from splap_editor.ui.widgets.overlay import Overlay
 
@@ -35,6 +36,10 @@ class FileDrop:
             self.files.open_path(path)
 
 
+def _can_be_opened(path: Path) -> bool:
+    return path.suffix.lower() in (".splap", ".json", ".gltf") or format_named(path) is not None
+
+
 def _dropped_path(event: QDropEvent) -> Path | None:
     paths = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
-    return next((path for path in paths if path.suffix.lower() in (".ply", ".splap", ".json")), None)
+    return next((path for path in paths if _can_be_opened(path)), None)

@@ -157,6 +157,6 @@ def check_cache(path: Path, number: int) -> bool:
     return found is not None
 
 
-OTHER_FORMATS = ("spz", "sog", "ksplat", "splat")
+OTHER_FORMATS = ("spz", "sog", "ksplat", "splat", "glb")
 CHECKS = {"ply": check_ply, "recipe": check_recipe, "session": check_session, "npz": check_npz, "cache": check_cache}
 CHECKS |= dict.fromkeys(OTHER_FORMATS, check_splats)

@@ -148,6 +148,15 @@ def unpacked_bytes(data: bytes, rng: np.random.Generator) -> bytes:
     return _with_member(data, rng, None, change)
 
 
+def chunk_value(data: bytes, rng: np.random.Generator) -> bytes:
+    """A value in the JSON of a .glb becomes another, its lengths made right."""
+    length = int.from_bytes(data[12:16], "little")
+    changed = json_value(data[20 : 20 + length], rng)
+    changed += b" " * (-len(changed) % 4)
+    whole = data[:12] + len(changed).to_bytes(4, "little") + data[16:20] + changed + data[20 + length :]
+    return whole[:8] + len(whole).to_bytes(4, "little") + whole[12:]
+
+
 def member_value(data: bytes, rng: np.random.Generator) -> bytes:
     """A value in the meta.json of a zip becomes another."""
     return _with_member(data, rng, "meta.json", json_value)
@@ -177,6 +186,7 @@ MUTATIONS: dict[str, tuple[Mutation, ...]] = {
     "spz": (unpacked_bytes, unpacked_bytes, *BYTES),
     "sog": (member_value, member_value, unpacked_bytes, *BYTES),
     "ksplat": (odd_floats, *BYTES),
+    "glb": (chunk_value, chunk_value, odd_floats, *BYTES),
     "splat": (odd_floats, *BYTES),
 }
 

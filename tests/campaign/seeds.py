@@ -138,7 +138,7 @@ def _other(ending: str, which: int) -> bytes:
         shN=rng.normal(size=(n, n_rest, 3)).astype("f4"),
     )
     out = BytesIO()
-    FORMATS_OF_SPLATS[ending].write(out, splats, no_progress)
+    FORMATS_OF_SPLATS[ending if ending != "glb" else "gltf"].write(out, splats, no_progress)
     if ending == "spz" and which % 2:
         return _spz_4(gzip.decompress(out.getvalue()), n, degree)
     return out.getvalue()
@@ -181,7 +181,6 @@ def _spz_4(unpacked: bytes, n: int, degree: int) -> bytes:
 
 
 KINDS: dict[str, Callable[[int], bytes]] = {"ply": ply, "recipe": recipe, "session": session, "npz": npz, "cache": npz}
-KINDS |= {
-    ending: lambda number, ending=ending: _other(ending, number % 24) for ending in ("spz", "sog", "ksplat", "splat")
-}
+OTHERS = ("spz", "sog", "ksplat", "splat", "glb")
+KINDS |= {ending: lambda number, ending=ending: _other(ending, number % 24) for ending in OTHERS}
 """What is read, and what makes it; a cache entry is made from its archive by the check."""

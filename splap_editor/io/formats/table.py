@@ -106,6 +106,12 @@ def _is_sog(start: bytes) -> bool:
     return start[:4] == b"PK\x03\x04"
 
 
+def _is_gltf(start: bytes) -> bool:
+    from splap_editor.io.formats.gltf import MAGIC, is_text
+
+    return start[:4] == MAGIC or is_text(start)
+
+
 def _is_ksplat(start: bytes) -> bool:
     from splap_editor.io.formats.ksplat import is_header
 
@@ -166,6 +172,15 @@ FORMATS: dict[str, SplatFormat] = {
             "of 256 values, view-dependent colours one of up to 65,536 sets",
             reorders=True,
             readers="SuperSplat, PlayCanvas, splat-transform, Spark",
+        ),
+        SplatFormat(
+            "gltf",
+            "glTF with KHR_gaussian_splatting",
+            (".glb",),
+            _is_gltf,
+            reads="gltf:read",
+            writes="gltf:write",
+            readers="PlayCanvas, Babylon.js, Cesium",
         ),
         SplatFormat("ksplat", "KSPLAT", (".ksplat",), _is_ksplat, reads="ksplat:read", reorders=True),
         # Last: without a header, it is whatever could be one.

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QFileDialog, QMessageBox, QWidget
 
 from splap_editor.engine.export_report import ExportReport
 from splap_editor.io.session_file import SUFFIX
+from splap_editor.io.splat_files import name_filter
 from splap_editor.resources import resource
 from splap_editor.session.bound_edit import column_lacks
 from splap_editor.session.documents import Documents
@@ -21,7 +22,7 @@ from splap_editor.ui.widgets.plain_text import PlainMessageBox
 from splap_editor.ui.widgets.toast import Toast
 from splap_editor.viewport.viewport import Viewport
 
-OPEN_FILTER = "Splat PLY or session (*.ply *.splap);;All files (*)"
+OPEN_FILTER = f"Splats or session ({name_filter()} *.gltf *.splap);;All files (*)"
 EDIT_FILTER = "Edit (*.json);;All files (*)"
 SAMPLE = "windmill_2dgs.ply"
 
@@ -111,7 +112,7 @@ class FileActions:
 
     def _export(self, dialog: ExportDialog) -> None:
         QSettings().setValue("files/folder", str(dialog.path.parent))
-        self._session.export(dialog.path, as_3dgs=dialog.as_3dgs, columns=dialog.columns.names)
+        self._session.export(dialog.path, as_3dgs=dialog.as_3dgs, columns=dialog.column_names)
 
     def save_edit(self) -> None:
         """Ask where to, and write the edit as a recipe."""

@@ -7,6 +7,7 @@ from pathlib import Path
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QCheckBox,
+    QComboBox,
     QDialog,
     QDialogButtonBox,
     QFileDialog,
@@ -17,11 +18,19 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from splap_editor.io.formats.table import FORMATS, SplatFormat, format_named, format_to_write
+from splap_editor.io.splat_files import FormatError, losses_of_saving, name_filter
 from splap_editor.session.scene import Scene
 from splap_editor.ui.theme import STEP
 from splap_editor.ui.widgets.columns_list import ColumnsList
 from splap_editor.ui.widgets.number_field import set_tone
 from splap_editor.ui.widgets.plain_text import PlainLabel
+
+_THIRD_SCALE = "Add a thin third scale, for programs that only know 3DGS"
+_ONLY_2DGS = (
+    "Two scales per splat, as 2DGS trainers write: read by 2DGS viewers and this editor. SuperSplat, splat-transform "
+    "and most others want three; tick the box below for them."
+)
 
 
 class ExportDialog(QDialog):
@@ -29,7 +38,7 @@ class ExportDialog(QDialog):
 
     def __init__(self, parent: QWidget, suggested: Path, scene: Scene, lacks: Mapping[str, str]) -> None:
         super().__init__(parent)
-        self.setWindowTitle("Export PLY")
+        self.setWindowTitle("Export")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self._source = scene.file.path
         self.path_field = QLineEdit(str(suggested))
@@ -41,13 +50,22 @@ class ExportDialog(QDialog):
         line.addWidget(self.path_field, 1)
         line.addWidget(browse)
         n = scene.splats.n_splats
-        facts = PlainLabel(
-            f"{n:,} splats in the file's own order and layout; rows that did not move stay as they are.", wordWrap=True
-        )
-        facts.setProperty("tone", "quiet")
+        self._file = scene.file
+        self._told: dict[str, list[str]] = {}
+        self.facts = PlainLabel(wordWrap=True)
+        self.facts.setProperty("tone", "quiet")
+        self._of_ply = f"{n:,} splats in the file's own order and layout; rows that did not move stay as they are."
+        self.format_field = QComboBox()
+        for row in FORMATS.values():
+            if row.can_be_written:
+                self.format_field.addItem(f"{row.title} (*{row.suffixes[0]})", row.name)
+        self.format_field.activated.connect(self._on_format_chosen)
+        self.losses = PlainLabel(wordWrap=True)
+        set_tone(self.losses, "warning")
         self.note = PlainLabel(wordWrap=True)
-        self.third_scale = QCheckBox("Add a thin third scale, for viewers that only know 3DGS")
-        self.third_scale.setVisible(scene.splats.n_scales == 2)
+        self.third_scale = QCheckBox(_THIRD_SCALE)
+        self._is_flat = scene.splats.n_scales == 2
+        self.third_scale.toggled.connect(self._check)
         self.columns = ColumnsList(lacks)
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
         self.accept_button = buttons.addButton("Export", QDialogButtonBox.ButtonRole.AcceptRole)
@@ -57,8 +75,10 @@ class ExportDialog(QDialog):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(5 * STEP, 5 * STEP, 5 * STEP, 4 * STEP)
         layout.setSpacing(3 * STEP)
-        layout.addWidget(facts)
+        layout.addWidget(self.facts)
         layout.addLayout(line)
+        layout.addWidget(self.format_field)
+        layout.addWidget(self.losses)
         layout.addWidget(self.third_scale)
         layout.addWidget(self.columns)
         layout.addWidget(self.note)
@@ -80,7 +100,19 @@ class ExportDialog(QDialog):
         """Whether a third scale is added."""
         return self.third_scale.isVisibleTo(self) and self.third_scale.isChecked()
 
+    @property
+    def format(self) -> SplatFormat:
+        """The format that the name's ending means; a PLY where it means none."""
+        found = format_named(self.path)
+        return found if found is not None and found.can_be_written else FORMATS["ply"]
+
+    @property
+    def column_names(self) -> tuple[str, ...]:
+        """Quantities to write too; only a PLY takes any."""
+        return self.columns.names if self.format.is_lossless else ()
+
     def _check(self) -> None:
+        self._show_format()
         try:
             text, tone, is_possible = self._verdict()
         except OSError as error:
@@ -99,18 +131,44 @@ class ExportDialog(QDialog):
             return "There is no such folder.", "danger", False
         if not os.access(self.path.parent, os.W_OK):
             return "This folder cannot be written to.", "danger", False
+        try:
+            format_to_write(self.path)
+        except FormatError as error:
+            return str(error), "danger", False
         if not self.path.exists():
             return "", "quiet", True
         if self.path.resolve() == self._source.resolve():
             return "This is the file that is open; it will be replaced.", "warning", True
         return "This file exists and will be replaced.", "warning", True
 
+    def _show_format(self) -> None:
+        """Say what the format of the name is, who reads it, and what it cannot hold of this file."""
+        row = self.format
+        self.format_field.setCurrentIndex(self.format_field.findData(row.name))
+        self.third_scale.setVisible(self._is_flat and row.is_lossless)
+        self.columns.setVisible(row.is_lossless)
+        if row.name not in self._told:
+            self._told[row.name] = losses_of_saving(self._file, row)
+        flat = self._is_flat and row.is_lossless and not self.third_scale.isChecked()
+        told = [_ONLY_2DGS] if flat else [f"Lost: {loss}" for loss in self._told[row.name]]
+        self.losses.setText("\n".join(told))
+        self.losses.setVisible(bool(told))
+        readers = f" Read by {row.readers}." if row.readers else ""
+        self.facts.setText((self._of_ply if row.is_lossless else f"{row.title}.") + readers)
+
+    def _on_format_chosen(self, index: int) -> None:
+        row = FORMATS[self.format_field.itemData(index)]
+        path = self.path
+        held = next((s for s in self.format.suffixes if path.name.lower().endswith(s)), path.suffix)
+        stem = path.name[: len(path.name) - len(held)] if held else path.name
+        self.path_field.setText(str(path.with_name(stem + row.suffixes[0])))
+
     def _on_browse_clicked(self) -> None:
-        dialog = QFileDialog(self, "Export PLY", str(self.path))
+        dialog = QFileDialog(self, "Export", str(self.path))
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.setOption(QFileDialog.Option.DontConfirmOverwrite)
-        dialog.setNameFilter("Splat PLY (*.ply)")
+        dialog.setNameFilter(f"Splats ({name_filter(to_write=True)})")
         dialog.setDefaultSuffix("ply")
         dialog.fileSelected.connect(self.path_field.setText)
         dialog.open()
