@@ -279,11 +279,33 @@ def free(snapshot: Snapshot) -> NDArray[np.float64]:
 
 
 def handle_weight(snapshot: Snapshot) -> NDArray[np.float64]:
-    """Weight of the chosen handle in [0, 1]; NaN for inert splats."""
-    assert snapshot.weights is not None and snapshot.handle is not None
-    column = snapshot.weights[:, [snapshot.handle]]
-    dense = column if isinstance(column, np.ndarray) else column.toarray()
-    return _of_nodes(snapshot.ellipses, dense[:, 0])
+    """Weight of the chosen handle, see `splat_weights`."""
+    assert snapshot.weights is not None and snapshot.handle is not None and snapshot.surface is not None
+    return splat_weights(snapshot.surface, snapshot.weights, snapshot.handle)
+
+
+def splat_weights(surface: Surface, weights: Weights, handle: int) -> NDArray[np.float64]:
+    """Weight of one handle at every splat of the file.
+
+    Parameters
+    ----------
+    surface : Surface
+    weights : (n, H) sparse or dense float64
+    handle : int
+        Column of the weights.
+
+    Returns
+    -------
+    (N,) float64
+        In 0..1; inert splats have the mean of the nodes that carry them, by which they move.
+    """
+    column = weights[:, [handle]]
+    of_nodes = (column if isinstance(column, np.ndarray) else column.toarray())[:, 0]
+    ellipses, binding = surface.ellipses, surface.binding
+    values = _of_nodes(ellipses, of_nodes)
+    carried = np.sum(of_nodes[binding.inert_carriers] * binding.inert_weights, axis=1)
+    values[ellipses.node_of_row < 0] = carried
+    return values
 
 
 QUANTITIES: dict[str, Quantity] = {

@@ -1,41 +1,13 @@
 """Bounded biharmonic weights as numbers per splat and in words."""
 
-import numpy as np
-from numpy.typing import NDArray
-
-from splap_editor.core.bbw.bbw import BbwReport, WeightedDeformer
+from splap_editor.core.bbw.bbw import BbwReport
 from splap_editor.engine.edit import Edit
-from splap_editor.engine.surface import Surface
 
 EXACT = 1e-12
 """Violations below this are roundoff."""
 
 KKT_WARNING = 1e-3
 """Steps of a weight left to go that a person would see."""
-
-
-def splat_weights(surface: Surface, deformer: WeightedDeformer, column: int) -> NDArray[np.float64]:
-    """Weight of one handle at every splat of the file.
-
-    Parameters
-    ----------
-    surface : Surface
-    deformer : WeightedDeformer
-    column : int
-        Handle, in the order in which they were bound.
-
-    Returns
-    -------
-    (N,) float64
-        In 0..1; inert splats have the mean of the nodes that carry them.
-    """
-    of_nodes = deformer.sparse_weights[:, [column]].toarray().ravel()
-    ellipses, binding = surface.ellipses, surface.binding
-    weights = np.zeros(ellipses.n_splats)
-    weights[ellipses.rows] = of_nodes
-    carried = np.sum(of_nodes[binding.inert_carriers] * binding.inert_weights, axis=1)
-    weights[np.flatnonzero(ellipses.node_of_row < 0)] = carried
-    return weights
 
 
 def weight_lines(edit: Edit, report: BbwReport) -> list[tuple[str, str]]:

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 from splap_editor.core.handle_nodes import Region, handle_nodes
 from splap_editor.core.options import Length, world_length
 from splap_editor.engine.edit import Handle
+from splap_editor.engine.quantities import splat_weights
 from splap_editor.session.scene import Scene
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.session.signals import Signal
-from splap_editor.session.weight_report import splat_weights
 from splap_editor.viewport.viewport import Viewport
 from splap_editor.viewport.weight_colors import weight_tints
 
@@ -101,7 +101,9 @@ class WeightView:
             return
         column = ids.index(handle.handle_id)
         if self._painted is None or self._painted[0] is not deformer or self._painted[1] != column:
-            self._take((deformer, column), weight_tints(splat_weights(surface, deformer, column)), handle)
+            self._take(
+                (deformer, column), weight_tints(splat_weights(surface, deformer.sparse_weights, column)), handle
+            )
         else:
             self._take(self._painted, None, handle)
 

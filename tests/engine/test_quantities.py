@@ -49,7 +49,7 @@ def test_each_is_one_number_a_splat_and_undefined_only_where_it_says_so(snapshot
     assert values.shape == (snapshot.splats.n_splats,) and values.dtype == np.float64
     inert = snapshot.ellipses.inert > 0
     assert np.isfinite(values[~inert]).all()
-    if QUANTITIES[name].needs or name in ("size", "stretch", "least_stretch"):
+    if (QUANTITIES[name].needs and name != "weight") or name in ("size", "stretch", "least_stretch"):
         assert np.isnan(values[inert]).all()
 
 
@@ -99,6 +99,14 @@ def test_distance_is_zero_at_the_picked_splat_and_obeys_the_triangle_inequality_
 
 def test_degrees_count_both_ends_of_each_edge(snapshot):
     assert np.nansum(QUANTITIES["degree"].values(snapshot)) == 2 * snapshot.surface.graph.n_edges
+
+
+def test_an_inert_splat_has_the_mean_weight_of_those_that_carry_it(snapshot):
+    weight, ellipses, binding = QUANTITIES["weight"].values(snapshot), snapshot.ellipses, snapshot.surface.binding
+    inert = np.flatnonzero(ellipses.inert > 0)
+    assert len(inert) and np.isfinite(weight).all()
+    for row, carriers, shares in zip(inert, binding.inert_carriers, binding.inert_weights, strict=True):
+        assert weight[row] == pytest.approx(weight[ellipses.rows[carriers]] @ shares, abs=1e-12)
 
 
 def test_what_is_held_has_the_handles_whole_weight(snapshot):

@@ -9,10 +9,10 @@ from splap_editor.cli import main as command_line
 from splap_editor.core.bbw.options import BbwOptions
 from splap_editor.core.reach_options import CageOptions
 from splap_editor.engine.edit import Pose
+from splap_editor.engine.quantities import splat_weights
 from splap_editor.io.ply import read_ply
 from splap_editor.resources import resource
 from splap_editor.session.placement import disc_rows, rows_region
-from splap_editor.session.weight_report import splat_weights
 from splap_editor.ui.widgets.number_field import ScrubLabel
 from splap_editor.viewport.weight_colors import BAND_COLORS, REST_COLOR, weight_tints
 
@@ -56,11 +56,11 @@ def test_weights_of_the_chosen_handle_are_shown_and_follow_the_choice(driver):
     painted = []
     driver.window.view.weights.changed.connect(lambda: painted.append(driver.window.weight_legend.title))
     driver.key(Qt.Key.Key_W, Qt.KeyboardModifier.ShiftModifier)
-    weights = splat_weights(driver.scene.surface, driver.session.bound.deformer, 1)
+    weights = splat_weights(driver.scene.surface, driver.session.bound.weights, 1)
     np.testing.assert_array_equal(laid(driver), weight_tints(weights))
     assert driver.window.weight_legend.isVisible()
     driver.scene.set_active_handles((first.handle_id,))
-    weights = splat_weights(driver.scene.surface, driver.session.bound.deformer, 0)
+    weights = splat_weights(driver.scene.surface, driver.session.bound.weights, 0)
     np.testing.assert_array_equal(laid(driver), weight_tints(weights))
     driver.key(Qt.Key.Key_W, Qt.KeyboardModifier.ShiftModifier)
     assert not is_weights(driver)
