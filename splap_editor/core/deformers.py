@@ -36,7 +36,7 @@ class DeformerRow:
     named : tuple of str
         Modules that the one that binds imports by names out of a table: source of what it makes.
     ready : str
-        ``"module:name"`` of ``ready(surface)``, which makes what the first drag would wait for; empty for nothing.
+        ``"module:name"`` of ``ready(surface, keep)``, which makes what the first drag waits for; empty for nothing.
     tip : str
         What an artist would call it.
     """

@@ -263,10 +263,11 @@ def written_splats(rest: Splats, kernels: AdaptedKernels | None, edit: Edit) -> 
     return placed_splats(splats, edit.place)
 
 
-def ready_for_drags(surface: Surface) -> None:
-    """Make what the first drag of any deformer would wait for."""
+def ready_for_drags(surface: Surface, cache: StageCache | None = None) -> None:
+    """Make what the first drag of any deformer would wait for, or take it from where it is kept."""
     for ready in dict.fromkeys(row.ready for row in DEFORMERS if row.ready):
-        loaded(ready)(surface)
+        made_by = source_hash(ready.partition(":")[0])
+        loaded(ready)(surface, made_anew if cache is None else _kept_in(cache, (made_by, surface.key)))
 
 
 def handles_of(surface: Surface, edit: Edit) -> Handles:

@@ -99,7 +99,7 @@ def prepared_surface(job: Job, request: SurfaceRequest) -> Surface:
         alone=alone,
     )
     job.report(0.0, "coarse model")
-    ready_for_drags(surface)
+    ready_for_drags(surface, request.cache)
     return surface
 
 

@@ -7,6 +7,8 @@ import pytest
 
 from splap_editor.core.adaptation.kernel_adaptation import adapted_splats
 from splap_editor.core.adaptation.options import AdaptationOptions
+from splap_editor.core.arap.binding import arap_scene
+from splap_editor.core.arap.coarse import CoarseModel
 from splap_editor.core.arap.options import ArapOptions
 from splap_editor.core.graph.splat_graph import GraphOptions
 from splap_editor.core.handle_nodes import Region
@@ -16,7 +18,7 @@ from splap_editor.core.progress import Cancelled
 from splap_editor.core.reach_options import ReachOptions
 from splap_editor.core.splats.rotations import quats_to_matrices
 from splap_editor.core.splats.splats import Splats
-from splap_editor.engine.bound_edit import bind
+from splap_editor.engine.bound_edit import bind, ready_for_drags
 from splap_editor.engine.bound_edit import posed as posed_file
 from splap_editor.engine.cache import StageCache
 from splap_editor.engine.edit import Edit, Handle, Pin
@@ -27,6 +29,7 @@ from splap_editor.engine.surface_stages import packed_stages
 from splap_editor.io import plain_edit as plain
 from splap_editor.io.ply import read_ply
 from splap_editor.io.recipe import RecipeError, recipe_from_json, recipe_to_json
+from splap_editor.io.sample_maker import shape_sample
 from splap_editor.resources import resource
 
 FREED = OptionSet(ReachOptions(None))
@@ -233,6 +236,19 @@ def test_bbw_weights_are_kept_between_runs(splats, surface, tmp_path):
     np.testing.assert_array_equal(first.weights, second.weights)
     assert second.report.handles == first.report.handles
     assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_what_the_first_drag_waits_for_is_kept_between_runs(tmp_path, monkeypatch):
+    splats = shape_sample("tube", 6500).splats
+    cache = StageCache(tmp_path)
+    surface = surface_of(splats, GraphOptions(), cache=cache)
+    n_kept = len(list(tmp_path.iterdir()))
+    ready_for_drags(surface, cache)
+    assert len(list(tmp_path.iterdir())) == n_kept + 1
+    again = surface_of(splats, GraphOptions(), cache=cache)
+    monkeypatch.setattr(CoarseModel, "__init__", None)
+    ready_for_drags(again, cache)
+    assert again.shared(arap_scene).coarse.spacing == surface.shared(arap_scene).coarse.spacing
 
 
 def test_a_recipe_and_its_edit_are_the_same(splats, surface):

@@ -3,7 +3,7 @@
 from splap_editor.core.arap.arap import ArapDeformer
 from splap_editor.core.arap.options import ARAP_SOLVERS, ArapOptions
 from splap_editor.core.arap.scene import ArapScene
-from splap_editor.core.binding import BindableSurface, Binding
+from splap_editor.core.binding import BindableSurface, Binding, Keep
 from splap_editor.core.deformer import Handles
 
 
@@ -12,9 +12,9 @@ def arap_scene(surface: BindableSurface) -> ArapScene:
     return ArapScene(surface.rest, surface.L, surface.graph)
 
 
-def ready_arap(surface: BindableSurface) -> None:
+def ready_arap(surface: BindableSurface, keep: Keep) -> None:
     """Make the coarse model, so that the first drag need not wait for it."""
-    _ = surface.shared(arap_scene).coarse
+    surface.shared(arap_scene).ready(keep)
 
 
 def arap_deformer(*arguments: object, options: ArapOptions = ArapOptions(), **others: object) -> ArapDeformer:

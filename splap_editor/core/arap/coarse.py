@@ -11,6 +11,7 @@ from splap_editor.core.arap.problem import ArapProblem, Constraints, Pose, edge_
 from splap_editor.core.arap.rigid_parts import LooseParts
 from splap_editor.core.deformer import FREE, PIN
 from splap_editor.core.graph.splat_graph import SplatGraph
+from splap_editor.core.kept_arrays import Arrays, require_array, require_rows
 from splap_editor.core.splats.rotations import matrices_to_quats
 from splap_editor.core.surface.node_sampling import farthest_nodes, nearest_samples
 
@@ -40,20 +41,65 @@ class CoarseModel:
     """
 
     def __init__(self, rest: NDArray[np.float64], W: sp.csr_matrix, graph: SplatGraph, n_samples: int) -> None:
-        self.samples: NDArray[np.int64] = farthest_nodes(graph, n_samples)
-        self.rest: NDArray[np.float64] = np.ascontiguousarray(rest[self.samples])
-        near, distances = nearest_samples(graph, self.samples, _N_NEAR + 1)
-        self.W = _balanced_weights(rest, W, near[:, 0], self.samples)
-        self.component: NDArray[np.int32] = connected_components(self.W, directed=False)[1].astype(np.int32)
+        samples = farthest_nodes(graph, n_samples)
+        near, distances = nearest_samples(graph, samples, _N_NEAR + 1)
+        weights = _balanced_weights(rest, W, near[:, 0], samples)
         lost = np.flatnonzero(near[:, 0] < 0)
         if len(lost):
             # Dust that got no sample of its own borrows those nearest in space.
-            k = min(_N_NEAR + 1, len(self.samples))
-            distances[lost, :k], near[lost, :k] = cKDTree(self.rest).query(rest[lost], k=range(1, k + 1))
-        apart = distances[self.samples, 1]
+            k = min(_N_NEAR + 1, len(samples))
+            distances[lost, :k], near[lost, :k] = cKDTree(rest[samples]).query(rest[lost], k=range(1, k + 1))
+        apart = distances[samples, 1]
         apart = apart[np.isfinite(apart)]
-        self.spacing: float = float(np.median(apart)) if len(apart) else 0.0
-        self.near, self.shares = _blend_shares(near, distances)
+        self._hold(
+            rest, samples, weights, float(np.median(apart)) if len(apart) else 0.0, *_blend_shares(near, distances)
+        )
+
+    def _hold(
+        self,
+        rest: NDArray[np.float64],
+        samples: NDArray[np.int64],
+        weights: sp.csr_matrix,
+        spacing: float,
+        near: NDArray[np.int32],
+        shares: NDArray[np.float64],
+    ) -> None:
+        self.samples, self.W, self.spacing, self.near, self.shares = samples, weights, spacing, near, shares
+        self.rest: NDArray[np.float64] = np.ascontiguousarray(rest[samples])
+        self.component: NDArray[np.int32] = connected_components(weights, directed=False)[1].astype(np.int32)
+
+    def packed(self) -> Arrays:
+        """Arrays that it can be made of again, by `unpacked`."""
+        return {
+            "samples": self.samples,
+            "weights_indptr": self.W.indptr.astype(np.int32, copy=False),
+            "weights_indices": self.W.indices.astype(np.int32, copy=False),
+            "weights_data": self.W.data,
+            "spacing": np.array(self.spacing),
+            "near": self.near,
+            "shares": self.shares,
+        }
+
+    @classmethod
+    def unpacked(cls, kept: Arrays, rest: NDArray[np.float64]) -> "CoarseModel":
+        """Make a model of packed arrays.
+
+        Raises
+        ------
+        CacheEntryError, KeyError
+            If they are not of these nodes, or an index is out of range.
+        """
+        n, m = len(rest), len(kept["samples"])
+        require_array(kept["samples"], "samples", (m,), np.int64, (0, n))
+        require_rows(kept, "weights", m, m)
+        require_array(kept["weights_data"], "weights_data", kept["weights_indices"].shape, np.float64)
+        require_array(kept["spacing"], "spacing", (), np.float64)
+        require_array(kept["near"], "near", (n, _N_NEAR), np.int32, (0, m))
+        require_array(kept["shares"], "shares", (n, _N_NEAR), np.float64)
+        weights = sp.csr_matrix((kept["weights_data"], kept["weights_indices"], kept["weights_indptr"]), shape=(m, m))
+        model = cls.__new__(cls)
+        model._hold(rest, kept["samples"], weights, float(kept["spacing"]), kept["near"], kept["shares"])
+        return model
 
 
 def _blend_shares(

@@ -1,7 +1,5 @@
 """What as-rigid-as-possible deformation of a scene needs before any handle is placed."""
 
-from functools import cached_property
-
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
@@ -9,6 +7,7 @@ from scipy.sparse.csgraph import connected_components
 
 from splap_editor.core.arap.coarse import CoarseModel
 from splap_editor.core.arap.problem import edge_weights
+from splap_editor.core.binding import Keep, made_anew
 from splap_editor.core.graph.splat_graph import SplatGraph
 
 SMALL = 6000
@@ -21,8 +20,8 @@ N_SAMPLES = 4000
 class ArapScene:
     """Shared by all handle sets of a scene; make it once.
 
-    The coarse model takes about two seconds at 100,000 nodes. It is made when it is first needed; touch `coarse` in
-    the background to have it ready.
+    The coarse model takes about a second at 100,000 nodes. It is made when it is first needed; `ready` has it made in
+    the background, or taken from where it is kept.
 
     Parameters
     ----------
@@ -58,13 +57,25 @@ class ArapScene:
         self.rest: NDArray[np.float64] = rest
         self.graph = graph
         self._small, self._n_samples = small, n_samples
+        self._coarse: CoarseModel | None = None
         self.W: sp.csr_matrix = edge_weights(L)
         _, component = connected_components(self.W, directed=False)
         self.component: NDArray[np.int32] = component.astype(np.int32)
 
-    @cached_property
+    @property
     def coarse(self) -> CoarseModel | None:
         """The coarse model for dragging; None for a scene small enough to do without."""
+        return self.ready(made_anew)
+
+    def ready(self, keep: Keep) -> CoarseModel | None:
+        """Have the coarse model at hand, the one that is kept if there is one."""
         if len(self.rest) <= self._small:
             return None
-        return CoarseModel(self.rest, self.W, self.graph, self._n_samples)
+        if self._coarse is None:
+            self._coarse = keep(
+                ("coarse model", self._n_samples),
+                lambda: CoarseModel(self.rest, self.W, self.graph, self._n_samples),
+                CoarseModel.packed,
+                lambda kept: CoarseModel.unpacked(kept, self.rest),
+            )
+        return self._coarse

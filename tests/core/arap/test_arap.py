@@ -1,9 +1,11 @@
 import numpy as np
 import pytest
 
+from splap_editor.core.arap.coarse import CoarseModel
 from splap_editor.core.arap.options import ArapOptions
 from splap_editor.core.arap.scene import ArapScene
 from splap_editor.core.deformer import UnconstrainedComponentError
+from splap_editor.core.kept_arrays import CacheEntryError
 from splap_editor.core.progress import Cancelled
 from tests.core.arap.arap_scenes import Scene, edge_graph, holding, joined, moved, rigid, strip
 from tests.reference.arap import local_global, spokes_energy
@@ -295,6 +297,20 @@ def test_coarse_drag_is_close_to_the_settled_result():
     np.testing.assert_allclose(
         settled.positions, scene.deformer(handles, tolerance=1e-9).solve(BEND).positions, atol=4e-4
     )
+
+
+def test_a_kept_coarse_model_drags_to_the_same_bits_and_a_damaged_one_is_refused():
+    scene = strip(120, 30)
+    handles = holding(scene.rest, [scene.rest[:, 0] > 0.93], scene.rest[:, 0] < 0.07)
+    made, kept = _coarse(scene, 300), _coarse(scene, 300)
+    arrays = made.coarse.packed()
+    kept.ready(lambda name, make, packed, unpacked: unpacked(arrays))
+    frames = [scene.deformer(handles, scene=shared).drag(BEND) for shared in (made, kept)]
+    np.testing.assert_array_equal(frames[0].positions, frames[1].positions)
+    for name, wrong in (("near", -1), ("samples", len(scene.rest)), ("weights_indices", 300), ("shares", np.nan)):
+        damaged = {**arrays, name: np.full_like(arrays[name], wrong)}
+        with pytest.raises(CacheEntryError):
+            CoarseModel.unpacked(damaged, scene.rest)
 
 
 def test_a_drag_goes_on_from_the_settled_pose_without_a_jump():
