@@ -4,11 +4,11 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from splap_editor.core.graph.options import GraphOptions, Joint, Point
 from splap_editor.core.graph.splat_graph import SplatGraph, mended_graph
+from splap_editor.core.index_spaces import Nodes, RowPair
 from splap_editor.core.splats.occupancy import Ellipses
 from splap_editor.core.surface.geodesics import geodesic_distances
 from splap_editor.core.surface.joining import best_contacts
@@ -66,7 +66,7 @@ def stroke_mends(
     return mends
 
 
-def joint_contacts(ellipses: Ellipses, graph: SplatGraph, joint: Joint) -> NDArray[np.int64]:
+def joint_contacts(ellipses: Ellipses, graph: SplatGraph, joint: Joint) -> Nodes:
     """(P, 2) nodes by which the two rims of a joint are best tied; a node near both belongs to the nearer part."""
     apart = [
         geodesic_distances(graph, nodes_at(ellipses, part), limit=RIM * joint.reach) for part in (joint.a, joint.b)
@@ -75,14 +75,14 @@ def joint_contacts(ellipses: Ellipses, graph: SplatGraph, joint: Joint) -> NDArr
     return best_contacts(ellipses, first, second, graph.epsilon, reach=joint.reach)
 
 
-def nodes_at(ellipses: Ellipses, points: Iterable[Point]) -> NDArray[np.int64]:
+def nodes_at(ellipses: Ellipses, points: Iterable[Point]) -> Nodes:
     """Nodes nearest to some points, ascending, each once."""
     # A tree that is asked but a few times need not be a good one.
     tree = cKDTree(ellipses.centers, balanced_tree=False, compact_nodes=False)
     return np.unique(tree.query(np.array(list(points), np.float64).reshape(-1, 3))[1]).astype(np.int64)
 
 
-def row_pairs(ellipses: Ellipses, edges: NDArray[np.integer]) -> set[tuple[int, int]]:
+def row_pairs(ellipses: Ellipses, edges: Nodes) -> set[RowPair]:
     """Pairs of nodes as pairs of file rows, the smaller first."""
     return {(a, b) for a, b in np.sort(ellipses.rows[edges], axis=1).tolist()}
 
@@ -95,9 +95,9 @@ def _goes_on_from(options: GraphOptions, before: GraphOptions) -> bool:
     return not before.join or before.separate == options.separate
 
 
-def _ordered(pairs: Iterable[tuple[int, int]]) -> set[tuple[int, int]]:
+def _ordered(pairs: Iterable[RowPair]) -> set[RowPair]:
     return {(min(pair), max(pair)) for pair in pairs}
 
 
-def _sorted(pairs: set[tuple[int, int]]) -> tuple[tuple[int, int], ...]:
+def _sorted(pairs: set[RowPair]) -> tuple[RowPair, ...]:
     return tuple(sorted(pairs))

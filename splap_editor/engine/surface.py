@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from splap_editor.core.adaptation.kernel_binding import KernelBinding
 from splap_editor.core.graph.options import GRAPH_RULES, LAPLACIANS, NEIGHBORHOODS, GraphOptions
 from splap_editor.core.graph.splat_graph import SplatGraph, require_mendable
-from splap_editor.core.index_spaces import FileMask
+from splap_editor.core.index_spaces import FileMask, RowPair
 from splap_editor.core.progress import StageProgress, silent
 from splap_editor.core.splats.occupancy import Ellipses, occupancy_ellipses
 from splap_editor.core.splats.splats import Splats
@@ -186,7 +186,7 @@ def _without_removed(options: GraphOptions, ellipses: Ellipses) -> GraphOptions:
     if removed is None or not (options.cut or options.add):
         return options
 
-    def kept(pairs: tuple[tuple[int, int], ...]) -> tuple[tuple[int, int], ...]:
+    def kept(pairs: tuple[RowPair, ...]) -> tuple[RowPair, ...]:
         # A row beyond the file is refused where all of them are looked at.
         return tuple(pair for pair in pairs if not any(row < len(removed) and removed[row] for row in pair))
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from splap_editor.core.graph.options import NEIGHBORHOODS, GraphOptions
 from splap_editor.core.graph.splat_graph import SplatGraph, mended_graph, splat_graph
-from splap_editor.core.index_spaces import Nodes
+from splap_editor.core.index_spaces import Nodes, RowPair
 from splap_editor.core.kept_arrays import Arrays, require_array, require_rows
 from splap_editor.core.options import loaded
 from splap_editor.core.progress import Progress, StageProgress
@@ -127,7 +127,7 @@ def _changed_ends(ellipses: Ellipses, before: GraphOptions, after: GraphOptions)
     return ellipses.node_of_row[np.array(sorted({row for pair in pairs for row in pair}), np.int64)]
 
 
-def _pairs(pairs: Iterable[tuple[int, int]]) -> set[tuple[int, int]]:
+def _pairs(pairs: Iterable[RowPair]) -> set[RowPair]:
     return {(min(pair), max(pair)) for pair in pairs}
 
 

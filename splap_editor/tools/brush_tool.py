@@ -6,6 +6,7 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.index_spaces import FileMask
 from splap_editor.core.options import option
 from splap_editor.session.selection import SelectionMode, combined_selection
 from splap_editor.tools.bindings import Binding
@@ -58,7 +59,7 @@ class BrushStroke(DrawnStroke):
             if perf_counter() >= self._busy_until:
                 self._preview()
 
-    def inside(self, screen: NDArray[np.float32]) -> NDArray[np.bool_]:
+    def inside(self, screen: NDArray[np.float32]) -> FileMask:
         """(N,) which `screen_points` the brush went over."""
         return self.context.viewport.in_brush(screen, self.path, self.tool.radius_px)
 

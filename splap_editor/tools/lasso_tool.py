@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.index_spaces import FileMask
 from splap_editor.session.selection import SelectionMode
 from splap_editor.tools.select_tool import CLICKS, DrawnStroke, SelectTool, picking
 from splap_editor.tools.tool import PointerEvent
@@ -17,7 +18,7 @@ class LassoStroke(DrawnStroke):
             self.path.append(event.xy)
             self.context.hud.show(outline=tuple(self.path))
 
-    def inside(self, screen: NDArray[np.float32]) -> NDArray[np.bool_]:
+    def inside(self, screen: NDArray[np.float32]) -> FileMask:
         """(N,) which `screen_points` are in the outline."""
         return self.context.viewport.in_lasso(screen, self.path)
 

@@ -1,5 +1,6 @@
 """What lies under the cursor, for read-outs."""
 
+from splap_editor.core.index_spaces import FileRow
 from splap_editor.session.signals import Signal
 from splap_editor.tools.tool import PointerEvent, Tool, ToolContext
 
@@ -17,7 +18,7 @@ class ProbeTool(Tool):
         super().__init__(context)
         self.changed = Signal()
         self.is_on = False
-        self.row: int | None = None
+        self.row: FileRow | None = None
 
     def hover(self, event: PointerEvent) -> bool:
         """Look where the pointer goes, but not during a drag."""
@@ -34,7 +35,7 @@ class ProbeTool(Tool):
         """Forget what was under the cursor."""
         self._take(None)
 
-    def _take(self, row: int | None) -> None:
+    def _take(self, row: FileRow | None) -> None:
         if row != self.row:
             self.row = row
             self.changed.emit()

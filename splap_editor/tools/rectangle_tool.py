@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.index_spaces import FileMask
 from splap_editor.session.selection import SelectionMode
 from splap_editor.tools.select_tool import CLICKS, DrawnStroke, SelectTool, picking
 from splap_editor.tools.tool import PointerEvent
@@ -17,7 +18,7 @@ class RectangleStroke(DrawnStroke):
         (x0, y0), (x1, y1) = self.path
         self.context.hud.show(outline=((x0, y0), (x1, y0), (x1, y1), (x0, y1)))
 
-    def inside(self, screen: NDArray[np.float32]) -> NDArray[np.bool_]:
+    def inside(self, screen: NDArray[np.float32]) -> FileMask:
         """(N,) which `screen_points` are in the frame."""
         return self.context.viewport.in_rectangle(screen, *self.path[0], *self.path[-1])
 

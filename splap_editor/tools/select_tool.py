@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.index_spaces import FileMask
 from splap_editor.core.options import option
 from splap_editor.session.selection import SelectionMode, combined_selection
 from splap_editor.tools.bindings import Binding, Used
@@ -49,7 +50,7 @@ class DrawnStroke:
         """Draw on."""
         raise NotImplementedError
 
-    def inside(self, screen: NDArray[np.float32]) -> NDArray[np.bool_]:
+    def inside(self, screen: NDArray[np.float32]) -> FileMask:
         """(N,) which `screen_points` are in the region."""
         raise NotImplementedError
 
@@ -89,7 +90,7 @@ class SelectTool(Tool):
             picked[hit.row] = True
         self.select(picked, mode)
 
-    def select(self, picked: NDArray[np.bool_], mode: SelectionMode) -> None:
+    def select(self, picked: FileMask, mode: SelectionMode) -> None:
         """Let picked splats meet those selected: one step of the history."""
         session = self.context.session
         session.change_mask("selection", combined_selection(session.shown_scene.selection, picked, mode), "Select")

@@ -4,9 +4,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from splap_editor.core.graph.splat_graph import GraphOptions
+from splap_editor.core.index_spaces import FileMask
 from splap_editor.core.presets import PRESETS, with_preset
 from splap_editor.session.cards import has_edge
 from splap_editor.session.mends import best_links, edges_between, fragment_links, fragments, with_added, with_cut
@@ -34,7 +34,7 @@ class GraphActions:
     def __init__(
         self, session: Session, graph_view: GraphView, inspected: InspectView, say: Callable[[str], None]
     ) -> None:
-        self.kept: NDArray[np.bool_] | None = None
+        self.kept: FileMask | None = None
         self.kept_changed = Signal()
         self._session = session
         self._graph_view = graph_view
