@@ -150,6 +150,18 @@ class MainWindow(FileDrop, QMainWindow):
         self.statusBar().addPermanentWidget(self.state_line)
         # In a narrow window there is room for one of the two.
         self.job_bar.shown.connect(lambda on: self.state_line.hint.setVisible(not on))
+        self._follow()
+        self._show_tool()
+        self._show_display()
+        self._restore()
+        self._refresh()
+        viewport.setFocus()
+
+    # ---------------------------------------------------------------- parts
+
+    def _follow(self) -> None:
+        """Show what changes anywhere, and pass on what the parts ask for."""
+        session, viewport, view, display = self.session, self.viewport, self.view, self.display
         viewport.setCursor(Qt.CursorShape.CrossCursor)
         viewport.resized.connect(self._on_viewport_resized)
         viewport.compare_held.connect(display.hold_original)
@@ -169,22 +181,15 @@ class MainWindow(FileDrop, QMainWindow):
         session.history.changed.connect(self._refresh)
         session.state_changed.connect(self._on_state_changed)
         session.exported.connect(lambda report: self._refresh())
-        documents.changed.connect(self._refresh)
+        self.documents.changed.connect(self._refresh)
         self.inspection.changed.connect(self._refresh)
         session.job_changed.connect(lambda job: self._refresh())
         session.failed.connect(self._on_failed)
         self.deformer_panel.radius_hovered.connect(view.show_free_ring)
         self.deformer_panel.weights.set_action(self.actions_["display.weights"])
         self.handles_panel.cage_form.previewed.connect(view.weights.preview_cage)
-        tools.chosen_changed.connect(self._show_tool)
+        self.tools.chosen_changed.connect(self._show_tool)
         display.changed.connect(self._show_display)
-        self._show_tool()
-        self._show_display()
-        self._restore()
-        self._refresh()
-        viewport.setFocus()
-
-    # ---------------------------------------------------------------- parts
 
     def _actions(self) -> ActionSet:
         session, view, tools = self.session, self.view, self.tools
