@@ -119,6 +119,7 @@ def make_window(cache: StageCache | None = None) -> MainWindow:
     render_window = widget.render_window
     assert render_window is not None  # there is one until the widget is closed
     viewport = Viewport(render_window, pacer, renderer=widget.renderer, scale=scale)
+    viewport.refine_in = widget.render_in
     view = SceneView(session, viewport)
     documents = Documents(session, mailbox.post)
     autosave = Autosave(documents, mailbox.post)

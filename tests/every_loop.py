@@ -79,7 +79,8 @@ def _look(splats: Splats) -> None:
 
     from splap_editor.core.splats.main_subject import main_subject
     from splap_editor.viewport.depth_order import depth_order
-    from splap_editor.viewport.edge_lines import MOST_DRAWN, EdgeLines
+    from splap_editor.viewport.edge_lines import EdgeLines
+    from splap_editor.viewport.frame_quality import FrameQuality
     from splap_editor.viewport.glyphs import base_colors, splat_glyphs
     from splap_editor.viewport.picking import surface_hit
     from splap_editor.viewport.projection import Projection
@@ -100,7 +101,7 @@ def _look(splats: Splats) -> None:
     visible_only(actor, projection, screen, in_rectangle(screen, 8.0, 8.0, 56.0, 56.0))
     lines = EdgeLines(actor, vtkRenderer())
     lines.show([[0, 1], [1, 2]], (0, 0, 0))
-    lines.refresh(projection, thinning=MOST_DRAWN)
+    lines.refresh(projection, FrameQuality(0))
 
 
 def _sheet(n: int = 80) -> Splats:

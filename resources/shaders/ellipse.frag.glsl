@@ -9,8 +9,8 @@ flat in vec4 glyphColor;   // lit colour; a = 1 marks selected and highlighted g
 void main()
 {
   float radius = length(corner);
-  // Reciprocal size on screen; derivatives are taken before any discard.
-  float perPixel = max(length(vec2(dFdx(radius), dFdy(radius))), 1e-6);
+  // Reciprocal size in pixels of the screen; derivatives are taken before any discard.
+  float perPixel = max(length(vec2(dFdx(radius), dFdy(radius))) / coarseness, 1e-6);
   if (radius > 1.0) discard;
   if (coverage < 1.0 && ditherThreshold() > coverage) discard;
   //VTK::DepthPeeling::PreColor

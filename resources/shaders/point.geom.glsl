@@ -15,7 +15,7 @@ void main()
   {
     corner = CORNERS[q];
     glyphColor = color;
-    gl_Position = vec4(center.xy + corner * diameter / viewportPx * center.w, center.zw);
+    gl_Position = vec4(center.xy + corner * diameter / (coarseness * viewportPx) * center.w, center.zw);
     EmitVertex();
   }
   EndPrimitive();

@@ -4,6 +4,8 @@
 out vec2 corner;           // in standard deviations
 flat out vec4 glyphColor;
 
+const float LOW_PASS = 0.3;
+
 vec3 row(mat4 m, int i) { return vec3(m[0][i], m[1][i], m[2][i]); }
 
 void main()
@@ -11,9 +13,6 @@ void main()
   vec4 eyePoint = MCVCMatrix * vec4(gl_in[0].gl_Position.xyz, 1.0);
   vec4 center = MCDCMatrix * vec4(gl_in[0].gl_Position.xyz, 1.0);
   if (!isDrawn() || center.w <= 0.0) return;
-  // The quad ends where the splat's own threshold or 1/255 of opacity cuts it off.
-  float reach = min(shapeVS[0].y, sqrt(max(2.0 * log(255.0 * colorVS[0].a), 0.0)));
-  if (reach <= 0.0) return;
 
   mat3 view = mat3(MCVCMatrix);
   vec3 u = view * axisUVS[0] * glyphScale;
@@ -37,9 +36,20 @@ void main()
   }
   vec3 x = vec3(dot(jx, u), dot(jx, v), dot(jx, w));
   vec3 y = vec3(dot(jy, u), dot(jy, v), dot(jy, w));
-  float cxx = dot(x, x) + 0.3;
-  float cyy = dot(y, y) + 0.3;
+  float cxx = dot(x, x);
+  float cyy = dot(y, y);
   float cxy = dot(x, y);
+  // The low-pass widens what is narrower than a pixel. Of coarse pixels it takes as much opacity as the splat would
+  // spread over more of the screen than the fine picture shows: the factor is exactly 1 where pixels are the screen's.
+  float finer = LOW_PASS / (coarseness * coarseness);
+  float shown = max((cxx + finer) * (cyy + finer) - cxy * cxy, 0.0);
+  cxx += LOW_PASS;
+  cyy += LOW_PASS;
+  float alpha = colorVS[0].a;
+  if (coarseness > 1.0) alpha *= min(sqrt(shown / (cxx * cyy - cxy * cxy)), 1.0);
+  // The quad ends where the splat's own threshold or 1/255 of opacity cuts it off.
+  float reach = min(shapeVS[0].y, sqrt(max(2.0 * log(255.0 * alpha), 0.0)));
+  if (reach <= 0.0) return;
 
   float mean = 0.5 * (cxx + cyy);
   float spread = length(vec2(0.5 * (cxx - cyy), cxy));
@@ -49,7 +59,7 @@ void main()
   vec2 s1 = reach * sqrt(major) * e * 2.0 / viewportPx;
   vec2 s2 = reach * sqrt(minor) * vec2(-e.y, e.x) * 2.0 / viewportPx;
   if (any(greaterThan(abs(center.xy) - (abs(s1) + abs(s2)) * center.w, vec2(center.w)))) return;
-  vec4 color = vec4(tinted(colorVS[0].rgb), colorVS[0].a * coverage);
+  vec4 color = vec4(tinted(colorVS[0].rgb), alpha * coverage);
   for (int q = 0; q < 4; q++)
   {
     corner = CORNERS[q] * reach;

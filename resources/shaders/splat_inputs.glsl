@@ -8,9 +8,10 @@ in float flagsVS[];
 uniform mat4 MCDCMatrix;
 uniform mat4 MCVCMatrix;
 //VTK::CustomUniforms::Dec
-// glyphScale    size factor, times sqrt(k) while one splat in k is drawn
+// glyphScale    size factor
 // opacityCut    splats fainter than this are not drawn
-// viewportPx    width and height in pixels
+// viewportPx    width and height in pixels of the picture that is drawn
+// coarseness    how many pixels of the screen one of these is wide and high
 // selectTint, hoverTint, ghostTint, backfaceTint    colour and share of it
 const vec2 CORNERS[4] = vec2[](vec2(-1.0, -1.0), vec2(1.0, -1.0), vec2(-1.0, 1.0), vec2(1.0, 1.0));
 

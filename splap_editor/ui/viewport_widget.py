@@ -65,6 +65,8 @@ class ViewportWidget(QtInteractor):
         self._hover: PointerEvent | None = None
         self._is_compare_held = False
         self.n_renders = 0
+        self._later = QTimer(self, singleShot=True)
+        self._later.timeout.connect(self.render)
         interactor = self.iren.interactor
         interactor.EnableRenderOff()
         self._render_tag = interactor.AddObserver("RenderEvent", self._on_render_event)
@@ -91,6 +93,10 @@ class ViewportWidget(QtInteractor):
         if self._is_ready:
             self.update()
 
+    def render_in(self, seconds: float) -> None:
+        """Ask for a frame later; asked again meanwhile, counted from then on."""
+        self._later.start(round(1000.0 * seconds))
+
     def paintGL(self) -> None:
         """Draw one frame."""
         start = perf_counter()
@@ -114,6 +120,7 @@ class ViewportWidget(QtInteractor):
         """Free the GL objects; the widget shows nothing afterwards."""
         if self._is_ready:
             self._is_ready = False
+            self._later.stop()
             self.iren.interactor.RemoveObserver(self._render_tag)
         super().close()
 

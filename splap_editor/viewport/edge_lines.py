@@ -9,6 +9,7 @@ from vtkmodules.vtkRenderingCore import vtkPolyDataMapper, vtkRenderer
 
 from splap_editor.core.index_spaces import FileRows
 from splap_editor.resources import shader
+from splap_editor.viewport.frame_quality import FrameQuality
 from splap_editor.viewport.gizmo_actor import unlit_actor
 from splap_editor.viewport.projection import Projection
 from splap_editor.viewport.splat_actor import SplatActor
@@ -78,6 +79,7 @@ class EdgeLines:
         self.actor.VisibilityOff()
         self.n_edges = self.n_drawn = 0
         self._drawn_for: tuple[object, ...] = ()
+        self._width_px = 1.0
         self.near = 0.0
         self.fade = 0.75
         self.background = (0.1, 0.1, 0.1)
@@ -106,7 +108,7 @@ class EdgeLines:
         self._rgba[:, :3] = colors
         self._ranks = np.random.default_rng(0).random(self.n_edges)
         self._drawn_for = ()
-        self.actor.GetProperty().SetLineWidth(width_px)
+        self._width_px = width_px
         if self.n_edges:
             self._draw(slice(None))
 
@@ -120,14 +122,13 @@ class EdgeLines:
         self._poly.SetLines(lines)
         self._poly.GetCellData().SetScalars(numpy_to_vtk(self._shown_rgba))
 
-    def _choose(self, projection: Projection, thinning: int) -> None:
+    def _choose(self, projection: Projection, most: int) -> None:
         """Draw what is in the picture, as much of it as there is time for."""
-        most = MOST_DRAWN // thinning
         if self.n_edges <= most and self.n_drawn == self.n_edges:
             return
         clip = projection.clip_from_world.copy()
         clip[:, 3] += clip[:, :3] @ self._splats.origin
-        wanted = (clip.tobytes(), thinning, self._splats.vtk_points.GetMTime())
+        wanted = (clip.tobytes(), most, self._splats.vtk_points.GetMTime())
         if wanted == self._drawn_for:
             return
         self._drawn_for = wanted
@@ -148,11 +149,17 @@ class EdgeLines:
         twin.show(self._edges, self._rgba[:, :3], width_px)
         return twin
 
-    def refresh(self, projection: Projection, thinning: int = 1) -> None:
-        """Choose edges and set depth fade, near limit and lift for the picture that comes next."""
+    def refresh(self, projection: Projection, quality: FrameQuality | None = None) -> None:
+        """Choose edges and set width, depth fade, near limit and lift for the picture that comes next.
+
+        Of edges as large a share is drawn as of splats; without a quality, all.
+        """
         if not self.n_edges:
             return
-        self._choose(projection, thinning)
+        self._splats.settle()
+        quality = quality or FrameQuality(self._splats.n_splats)
+        self._choose(projection, MOST_DRAWN * quality.n_drawn // self._splats.n_splats)
+        self.actor.GetProperty().SetLineWidth(max(self._width_px / quality.coarseness, 1.0))
         row = np.append(projection.direction, projection.direction @ (self._splats.origin - projection.eye))
         middle = float(row[3])
         half = 0.5 * self._splats.extent

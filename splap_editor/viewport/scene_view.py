@@ -21,6 +21,7 @@ from splap_editor.session.pivot import Pivot, pivot_point
 from splap_editor.session.scene import Scene
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
+from splap_editor.viewport.contribution import Contribution, contribution
 from splap_editor.viewport.depth_order import depth_order
 from splap_editor.viewport.glyphs import Glyphs, base_colors, splat_glyphs
 from splap_editor.viewport.overlays import Mark, MarkShape, circle
@@ -71,12 +72,15 @@ class Depiction:
         Shapes at rest.
     colors : (N, 4) uint8
         Colours that do not depend on the view, and opacities.
+    by_contribution : Contribution
+        Which splats give most.
     sh0, shN : (N, 3), (N, K, 3) float32
         Coefficients in the order in memory that reading them wants; empty where no colour depends on the view.
     """
 
     rest: Glyphs
     colors: NDArray[np.uint8]
+    by_contribution: Contribution
     sh0: NDArray[np.float32]
     shN: NDArray[np.float32]
 
@@ -86,7 +90,8 @@ def depiction(splats: Splats) -> Depiction:
     has_view = splats.shN.shape[1] > 0
     sh0 = np.ascontiguousarray(splats.sh0, np.float32) if has_view else np.empty((0, 3), np.float32)
     shN = np.ascontiguousarray(splats.shN, np.float32) if has_view else np.empty((0, 0, 3), np.float32)
-    return Depiction(splat_glyphs(splats), base_colors(splats), sh0, shN)
+    rest, colors = splat_glyphs(splats), base_colors(splats)
+    return Depiction(rest, colors, contribution(rest, colors), sh0, shN)
 
 
 def presented(depicted: Depiction, kernels: AdaptedKernels | None, seen: SeenFrom) -> Presented:
@@ -265,7 +270,7 @@ class SceneView:
             self.depict(scene.splats)()
         depicted = self._depicted
         assert depicted is not None
-        self.viewport.splats.load(depicted.rest, depicted.colors, scene.ellipses.subject)
+        self.viewport.splats.load(depicted.rest, depicted.colors, scene.ellipses.subject, depicted.by_contribution)
         self.viewport.splats.set_subject(scene.ellipses.subject, scene.edit.removed)
         self.viewport.camera.world_up = np.array(self.preferred_up or suggested_up(scene.splats), np.float64)
         self.viewport.reset_camera()

@@ -11,13 +11,17 @@ from vtkmodules.vtkCommonCore import VTK_INT, vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkDataObject, vtkPolyData
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
-from splap_editor.core.index_spaces import FileMask, FileRows, RowsByPlace
+from splap_editor.core.index_spaces import FileMask, RowsByPlace
 from splap_editor.core.splats.main_subject import MainSubject
 from splap_editor.core.twofold_loop import TwofoldLoop
 from splap_editor.resources import shader
+from splap_editor.viewport.contribution import Contribution, contribution
+from splap_editor.viewport.depth_order import depth_order
+from splap_editor.viewport.frame_quality import FrameQuality
 from splap_editor.viewport.glyphs import Glyphs
 
 _BLOCK = 64
+ARRAYS = ("means", "axes_u", "axes_v", "shape", "colors", "flags")
 
 
 def _box(means: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -30,6 +34,17 @@ def _box(means: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.fl
         of_blocks = extreme.reduce(blocks, axis=0, initial=start).reshape(_BLOCK, 3)
         ends.append(extreme.reduce(np.concatenate([of_blocks, means[n:]]), axis=0, initial=start))
     return ends[0], ends[1]
+
+
+def _subtract(points: NDArray[np.floating], origin: NDArray[np.float64], out: NDArray[np.float32]) -> None:
+    """Write points (N, 3) relative to an origin to ``out``."""
+    if points.flags.c_contiguous:
+        n = len(points) - len(points) % _BLOCK
+        blocks = (n // _BLOCK, 3 * _BLOCK)
+        origins = np.tile(origin, _BLOCK)
+        np.subtract(points[:n].reshape(blocks), origins, out=out[:n].reshape(blocks), casting="same_kind")
+        points, out = points[n:], out[n:]
+    np.subtract(points, origin, out=out, casting="same_kind")
 
 
 @nb.njit(nogil=True, cache=True)
@@ -107,6 +122,49 @@ class SplatLook:
     coverage: float = 1.0
 
 
+class _Cloud:
+    """Some splats in the arrays that the graphics card reads: one GL point each, with its axes as attributes."""
+
+    def __init__(self, n: int):
+        self.means = np.empty((n, 3), np.float32)
+        self.axes_u = np.empty((n, 3), np.float32)
+        self.axes_v = np.empty((n, 3), np.float32)
+        self.shape = np.empty((n, 2), np.float32)
+        self.colors = np.empty((n, 4), np.uint8)
+        self.flags = np.zeros(n, np.uint8)
+        self._vtk = {name: numpy_to_vtk(getattr(self, name)) for name in ARRAYS}
+        self.vtk_points = vtkPoints()
+        self.vtk_points.SetData(self._vtk["means"])
+        self._poly = vtkPolyData()
+        self._poly.SetPoints(self.vtk_points)
+        self.mapper = vtkPolyDataMapper()
+        self.mapper.SetInputData(self._poly)
+        self.mapper.SetVBOShiftScaleMethod(0)
+        self.mapper.SetColorModeToDirectScalars()
+        for attribute, name in (("axisU", "axes_u"), ("axisV", "axes_v"), ("shape", "shape"), ("flags", "flags")):
+            self._vtk[name].SetName(name)
+            self._poly.GetPointData().AddArray(self._vtk[name])
+            self.mapper.MapDataArrayToVertexAttribute(attribute, name, vtkDataObject.FIELD_ASSOCIATION_POINTS, -1)
+        self._poly.GetPointData().SetScalars(self._vtk["colors"])
+
+    def modified(self, *names: str) -> None:
+        """Have these arrays uploaded again, and no others."""
+        for name in names:
+            self._vtk[name].Modified()
+        if "means" in names:
+            self.vtk_points.Modified()
+        self._poly.Modified()
+
+    def draw(self, places: NDArray[np.integer]) -> None:
+        """Draw these points, in this order."""
+        # One poly-vertex cell with all points: VTK walks through cells one by one, through ids fast.
+        self._places = np.ascontiguousarray(places, np.int32)
+        self._ends = np.array([0, len(places)], np.int32)
+        cells = vtkCellArray()
+        cells.SetData(numpy_to_vtk(self._ends, array_type=VTK_INT), numpy_to_vtk(self._places, array_type=VTK_INT))
+        self._poly.SetVerts(cells)
+
+
 class SplatActor:
     """N splats as GL points with their axes as vertex attributes.
 
@@ -114,7 +172,9 @@ class SplatActor:
     each ``set_*`` overwrites one of them and marks only that one changed, so
     a selection uploads no geometry. All rows are in file order; drawing
     order lives in the index buffer. Buffers are relative to `origin`, which
-    keeps float32 exact far from the world's zero.
+    keeps float32 exact far from the world's zero. While only some splats are
+    drawn they have buffers of their own, so that a moving picture does not
+    upload what it does not show.
 
     Parameters
     ----------
@@ -124,24 +184,33 @@ class SplatActor:
         Colour and opacity.
     subject : MainSubject
         What counts as the size of the scene, whatever floats about it.
+    by_contribution : Contribution, optional
+        Which splats give most; found here where the caller does not know it.
     """
 
-    def __init__(self, glyphs: Glyphs, colors: NDArray[np.uint8], subject: MainSubject):
+    def __init__(
+        self,
+        glyphs: Glyphs,
+        colors: NDArray[np.uint8],
+        subject: MainSubject,
+        by_contribution: Contribution | None = None,
+    ):
         n = len(glyphs.means)
         self.n_splats = n
         self.subject = subject
         self.origin = subject.center
-        self.means = np.empty((n, 3), np.float32)
-        self.axes_u = np.empty((n, 3), np.float32)
-        self.axes_v = np.empty((n, 3), np.float32)
-        self.shape = np.empty((n, 2), np.float32)
-        self.colors = np.empty((n, 4), np.uint8)
-        self.flags = np.zeros(n, np.uint8)
+        self.by_contribution = by_contribution or contribution(glyphs, colors)
+        self._all = _Cloud(n)
+        self._given: tuple[NDArray[np.floating], ...] | None = None
+        self.shape, self.colors, self.flags = self._all.shape, self._all.colors, self._all.flags
+        self.vtk_points = self._all.vtk_points
+        self._few: _Cloud | None = None
+        self._few_rows = np.empty(0, np.int32)
+        self._few_sorted_along: NDArray[np.float64] | None = None
+        self._coarseness = 1
         self._untinted = np.array(colors, np.uint8)
         self._tints: NDArray[np.uint8] | None = None
         self._order: RowsByPlace | None = None
-        self._shuffled = np.random.default_rng(0).permutation(n).astype(np.int32)
-        self._thinning = 1
         self._build()
         self.shape[:, 1] = glyphs.cutoffs
         reaches = np.linalg.norm(np.hstack([glyphs.axes_u, glyphs.axes_v]), axis=1) * glyphs.cutoffs
@@ -152,28 +221,11 @@ class SplatActor:
         self.set_colors(colors)
         self.look = SplatLook()
         self.set_viewport_size(1, 1)
-        self._index()
+        self.set_order(None)
 
     def _build(self) -> None:
-        self._vtk = {
-            name: numpy_to_vtk(getattr(self, name))
-            for name in ("means", "axes_u", "axes_v", "shape", "colors", "flags")
-        }
-        self.vtk_points = vtkPoints()
-        self.vtk_points.SetData(self._vtk["means"])
-        self._poly = vtkPolyData()
-        self._poly.SetPoints(self.vtk_points)
-        self._mapper = vtkPolyDataMapper()
-        self._mapper.SetInputData(self._poly)
-        self._mapper.SetVBOShiftScaleMethod(0)
-        self._mapper.SetColorModeToDirectScalars()
-        for attribute, name in (("axisU", "axes_u"), ("axisV", "axes_v"), ("shape", "shape"), ("flags", "flags")):
-            self._vtk[name].SetName(name)
-            self._poly.GetPointData().AddArray(self._vtk[name])
-            self._mapper.MapDataArrayToVertexAttribute(attribute, name, vtkDataObject.FIELD_ASSOCIATION_POINTS, -1)
-        self._poly.GetPointData().SetScalars(self._vtk["colors"])
         self.actor = vtkActor()
-        self.actor.SetMapper(self._mapper)
+        self.actor.SetMapper(self._all.mapper)
         self.actor.SetPosition(*self.origin)
         self.actor.GetProperty().LightingOff()
         self.actor.PickableOff()
@@ -190,15 +242,51 @@ class SplatActor:
         axes_v: NDArray[np.floating],
         thickness: NDArray[np.floating] | None = None,
     ) -> None:
-        """Overwrite all centres and axes (N, 3), world units, any float type; thickness (N,) only if given."""
-        np.subtract(means, self.origin, out=self.means, casting="same_kind")
-        self.axes_u[:] = axes_u
-        self.axes_v[:] = axes_v
-        self._modified("means", "axes_u", "axes_v")
+        """Overwrite all centres and axes (N, 3), world units, any float type; thickness (N,) only if given.
+
+        The arrays must not change afterwards: while only some splats are drawn, the others are read when wanted.
+        """
+        self._given = (means, axes_u, axes_v)
+        if self._few is None:
+            self.settle()
+        else:
+            rows = self._few_rows
+            np.subtract(means[rows], self.origin, out=self._few.means, casting="same_kind")
+            self._few.axes_u[:], self._few.axes_v[:] = axes_u[rows], axes_v[rows]
+            self._few.modified("means", "axes_u", "axes_v")
+            self._few_sorted_along = None
+            self.vtk_points.Modified()
         if thickness is not None:
             self.shape[:, 0] = thickness
             self._modified("shape")
-        self.vtk_points.Modified()
+
+    def settle(self) -> None:
+        """Take in the geometry of splats that are not drawn, if that was put off."""
+        if self._given is None:
+            return
+        (means, axes_u, axes_v), self._given = self._given, None
+        _subtract(means, self.origin, self._all.means)
+        self._all.axes_u[:] = axes_u
+        self._all.axes_v[:] = axes_v
+        self._all.modified("means", "axes_u", "axes_v")
+
+    @property
+    def means(self) -> NDArray[np.float32]:
+        """(N, 3) centres relative to `origin`."""
+        self.settle()
+        return self._all.means
+
+    @property
+    def axes_u(self) -> NDArray[np.float32]:
+        """(N, 3) first in-plane axes, world units."""
+        self.settle()
+        return self._all.axes_u
+
+    @property
+    def axes_v(self) -> NDArray[np.float32]:
+        """(N, 3) second in-plane axes, world units."""
+        self.settle()
+        return self._all.axes_v
 
     def set_colors(self, colors: NDArray[np.uint8]) -> None:
         """Overwrite all colours and opacities, (N, 4) uint8; tints stay on top."""
@@ -223,19 +311,44 @@ class SplatActor:
     def set_order(self, order: RowsByPlace | None) -> None:
         """Draw in this order, a permutation (N,) of the rows, farthest first; None: file order."""
         self._order = order
-        self._index()
+        self._all.draw(np.arange(self.n_splats, dtype=np.int32) if order is None else order)
 
-    def set_thinning(self, k: int) -> None:
-        """Draw one splat in ``k`` of a fixed random choice, √k larger; 1 draws all."""
-        if k != self._thinning:
-            self._thinning = k
-            self._index()
-            self._set_scale()
+    def set_quality(self, quality: FrameQuality) -> None:
+        """Draw so many splats, those that give most, for a picture of so coarse pixels."""
+        if quality.coarseness != self._coarseness:
+            self._coarseness = quality.coarseness
+            self._set_coarseness()
+        if quality.n_drawn == self.n_drawn:
+            return
+        self.settle()
+        if quality.n_drawn >= self.n_splats:
+            self._few = None
+            self._few_rows = np.empty(0, np.int32)
+        else:
+            # In file order, which is kinder to the cache and to whoever compares pictures.
+            self._few_rows = np.sort(self.by_contribution.rows[: quality.n_drawn])
+            self._few = _Cloud(quality.n_drawn)
+            self._few_sorted_along = None
+            self._modified(*ARRAYS)
+            self._few.draw(np.arange(quality.n_drawn, dtype=np.int32))
+        self.actor.SetMapper((self._few or self._all).mapper)
+
+    @property
+    def is_thinned(self) -> bool:
+        """Whether only some splats are drawn."""
+        return self._few is not None
 
     @property
     def n_drawn(self) -> int:
         """Number of splats sent to the graphics card."""
-        return -(-self.n_splats // self._thinning)
+        return self.n_splats if self._few is None else len(self._few_rows)
+
+    def sort_few(self, direction: NDArray[np.floating]) -> None:
+        """Order the splats of a thinned picture along a direction (3,); the order of all is for others to make."""
+        along = self._few_sorted_along
+        if self._few is not None and (along is None or not np.array_equal(along, direction)):
+            self._few.draw(depth_order(self._few.means, direction))
+            self._few_sorted_along = np.array(direction)
 
     # How it is drawn ----------------------------------------------------------------------------------------------
 
@@ -262,7 +375,8 @@ class SplatActor:
         for uniforms in (geometry, fragment):
             uniforms.SetUniformf("coverage", look.coverage)
         fragment.SetUniformf("rimShare", look.rim)
-        self._set_scale()
+        geometry.SetUniformf("glyphScale", look.size_factor)
+        self._set_coarseness()
 
     def set_viewport_size(self, width: int, height: int) -> None:
         """Size in device pixels of the picture that is drawn next."""
@@ -286,7 +400,7 @@ class SplatActor:
     def twin(self, size_in_pixels: float = 1.0) -> "SplatActor":
         """A second actor with a copy of the data and the same look, for another window with so much finer pixels."""
         glyphs = Glyphs(self.means + self.origin, self.axes_u, self.axes_v, self.shape[:, 0], self.shape[:, 1])
-        twin = SplatActor(glyphs, self.colors, self.subject)
+        twin = SplatActor(glyphs, self.colors, self.subject, self.by_contribution)
         twin.set_flags(self.flags)
         twin.look = replace(self._look, point_size_px=self._look.point_size_px * size_in_pixels)
         return twin
@@ -297,22 +411,28 @@ class SplatActor:
         self.extent = max(2.0 * float(np.linalg.norm(subject.half_axes)) + 2.0 * self.reach, 1e-9)
         self._counted = None if removed is None or removed.all() else np.flatnonzero(~removed)
 
-    def bounds(self) -> NDArray[np.float64]:
-        """(2, 3) box around all splats that are not removed, world units, with room for their size at rest."""
-        low, high = _box(self.means if self._counted is None else self.means[self._counted])
+    def bounds(self, *, of_drawn: bool = False) -> NDArray[np.float64]:
+        """(2, 3) box around all splats that are not removed, or those drawn, world units, with room for their size."""
+        if of_drawn and self._few is not None:
+            low, high = _box(self._few.means)
+        else:
+            low, high = _box(self.means if self._counted is None else self.means[self._counted])
         return np.array([low - self._room, high + self._room]) + self.origin
 
     # Inside -------------------------------------------------------------------------------------------------------
 
-    def _set_scale(self) -> None:
-        self._shaders.GetGeometryCustomUniforms().SetUniformf(
-            "glyphScale", self._look.size_factor * self._thinning**0.5
-        )
+    def _set_coarseness(self) -> None:
+        for uniforms in (self._shaders.GetGeometryCustomUniforms(), self._shaders.GetFragmentCustomUniforms()):
+            uniforms.SetUniformf("coarseness", float(self._coarseness))
 
     def _modified(self, *names: str) -> None:
-        for name in names:
-            self._vtk[name].Modified()
-        self._poly.Modified()
+        self._all.modified(*names)
+        if self._few is not None:
+            for name in names:
+                np.take(getattr(self._all, name), self._few_rows, axis=0, out=getattr(self._few, name))
+            self._few.modified(*names)
+            if "means" in names:
+                self._few_sorted_along = None
 
     def _mix_tints(self) -> None:
         if self._tints is None:
@@ -320,22 +440,3 @@ class SplatActor:
         else:
             _mix(self._untinted, self._tints, self.colors)
         self._modified("colors")
-
-    def _index(self) -> None:
-        rows: FileRows = np.arange(self.n_splats, dtype=np.int32)
-        if self._thinning > 1:
-            rows = self._shuffled[: self.n_drawn]
-        if self._order is not None:
-            rows = self._order
-            if self._thinning > 1:
-                kept = np.zeros(self.n_splats, bool)
-                kept[self._shuffled[: self.n_drawn]] = True
-                rows = rows[kept[rows]]
-        elif self._thinning > 1:
-            rows = np.sort(rows)
-        # One poly-vertex cell with all points: VTK walks through cells one by one, through ids fast.
-        self._rows = np.ascontiguousarray(rows, np.int32)
-        self._ends = np.array([0, len(rows)], np.int32)
-        cells = vtkCellArray()
-        cells.SetData(numpy_to_vtk(self._ends, array_type=VTK_INT), numpy_to_vtk(self._rows, array_type=VTK_INT))
-        self._poly.SetVerts(cells)

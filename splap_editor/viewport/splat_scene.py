@@ -10,8 +10,10 @@ from vtkmodules.vtkRenderingCore import vtkRenderer
 
 from splap_editor.core.index_spaces import FileMask, FileRows, RowsByPlace
 from splap_editor.core.splats.main_subject import MainSubject, main_subject
+from splap_editor.viewport.contribution import Contribution
 from splap_editor.viewport.depth_order import depth_order
 from splap_editor.viewport.edge_lines import EdgeLines
+from splap_editor.viewport.frame_quality import FrameQuality
 from splap_editor.viewport.glyphs import Glyphs
 from splap_editor.viewport.projection import Projection
 from splap_editor.viewport.splat_actor import DisplayMode, SplatActor, SplatFlag, SplatLook
@@ -74,17 +76,23 @@ class SplatScene:
 
     # Data ---------------------------------------------------------------------------------------------------------
 
-    def load(self, glyphs: Glyphs, colors: NDArray[np.uint8], subject: MainSubject | None = None) -> None:
+    def load(
+        self,
+        glyphs: Glyphs,
+        colors: NDArray[np.uint8],
+        subject: MainSubject | None = None,
+        by_contribution: Contribution | None = None,
+    ) -> None:
         """Show a new scene, at rest: its glyphs and colours (N, 4) uint8, in file order. The camera stays.
 
-        The main subject is found here where the caller does not know it.
+        The main subject, and which splats give most, are found here where the caller does not know them.
         """
         self.clear()
         if not len(glyphs.means):
             return
         self._rest, self._removed = glyphs, None
         subject = subject or main_subject(glyphs.means, np.asarray(colors[:, 3], np.float64) / 255.0)
-        self.deformed = SplatActor(glyphs, colors, subject)
+        self.deformed = SplatActor(glyphs, colors, subject, by_contribution)
         self._subject_rows = np.flatnonzero(subject.holds(glyphs.means, room=self.deformed.reach))
         self._renderer.AddActor(self.deformed.actor)
         self._flags = np.zeros(self.deformed.n_splats, np.uint8)
@@ -223,8 +231,9 @@ class SplatScene:
             return
         is_both = self._compare is Compare.BOTH
         if self._compare is not Compare.DEFORMED and self._original is None:
-            self._original = SplatActor(self._rest, self.deformed.base_colors, self.deformed.subject)
-            self._original.set_subject(self.deformed.subject, self._removed)
+            shown = self.deformed
+            self._original = SplatActor(self._rest, shown.base_colors, shown.subject, shown.by_contribution)
+            self._original.set_subject(shown.subject, self._removed)
             self._original.set_flags(self._flags)
             # Blended actors are drawn in the order they were added: the ghost first, under the deformed splats.
             self._renderer.RemoveActor(self.deformed.actor)
@@ -254,9 +263,9 @@ class SplatScene:
         """The actor that is picked: the original if it is shown alone."""
         return self._original if self._compare is Compare.ORIGINAL else self.deformed
 
-    def bounds(self) -> NDArray[np.float64] | None:
-        """(2, 3) box around all that is shown; None without a scene."""
-        boxes = [actor.bounds() for actor in self.shown_actors()]
+    def bounds(self, *, of_drawn: bool = False) -> NDArray[np.float64] | None:
+        """(2, 3) box around all that is shown, or what of it is drawn; None without a scene."""
+        boxes = [actor.bounds(of_drawn=of_drawn) for actor in self.shown_actors()]
         return np.array([np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]]) if boxes else None
 
     def subject_points(self) -> NDArray[np.float64]:
@@ -264,17 +273,26 @@ class SplatScene:
         actor = self.shown
         return np.empty((0, 3)) if actor is None else actor.means[self._subject_rows] + actor.origin
 
-    def prepare(self, projection: Projection, thinning: int, background: tuple[float, float, float]) -> None:
-        """Bring uniforms, thinning and drawing order up to the picture that comes next."""
+    def prepare(
+        self,
+        projection: Projection,
+        quality: FrameQuality,
+        size: tuple[int, int],
+        background: tuple[float, float, float],
+    ) -> None:
+        """Bring uniforms, quality and drawing order up to the picture that comes next, drawn at a size in pixels."""
         if self.deformed is None or self.edges is None:
             return
-        for actor in (self.deformed, self._original):
-            if actor:
-                actor.set_viewport_size(projection.width, projection.height)
-                actor.set_thinning(thinning)
+        actors = [actor for actor in (self.deformed, self._original) if actor]
+        for actor in actors:
+            actor.set_viewport_size(*size)
+            actor.set_quality(quality)
         self._follow_turn(projection, self.deformed)
+        if self._mode is DisplayMode.SPLATS:
+            for actor in actors:
+                actor.sort_few(projection.direction)
         self.edges.background = background
-        self.edges.refresh(projection, thinning)
+        self.edges.refresh(projection, quality)
 
     def _follow_turn(self, projection: Projection, deformed: SplatActor) -> None:
         """Sort again, and tell the host, when the view has turned far enough to show."""
@@ -292,6 +310,10 @@ class SplatScene:
         if self._mode is not DisplayMode.SPLATS:
             return
         needs_order = self._needs_order or (has_turned and not self.view_turned)
+        if deformed.is_thinned:
+            # The few have an order of their own; that of all can wait until they are drawn.
+            self._needs_order = needs_order
+            return
         if needs_order:
             deformed.set_order(depth_order(deformed.means, direction))
             self._needs_order = False

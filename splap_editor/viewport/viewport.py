@@ -14,19 +14,24 @@ from splap_editor.core.index_spaces import FileMask
 from splap_editor.viewport.axes_triad import AxesTriad
 from splap_editor.viewport.cage_outline import CageOutline
 from splap_editor.viewport.camera import Camera, View, box_corners
+from splap_editor.viewport.frame_quality import FrameQuality, QualityChooser
 from splap_editor.viewport.gizmo import Gizmo
 from splap_editor.viewport.gizmo_actor import GizmoActor
 from splap_editor.viewport.gizmo_parts import Part
+from splap_editor.viewport.magnifier import Magnifier
 from splap_editor.viewport.overlays import Markers, Rings
 from splap_editor.viewport.picking import Hit, surface_hit
 from splap_editor.viewport.projection import Projection
 from splap_editor.viewport.regions import in_brush, in_lasso, in_rectangle, screen_points, visible_only
 from splap_editor.viewport.splat_actor import DisplayMode
 from splap_editor.viewport.splat_scene import SplatScene
-from splap_editor.viewport.thinning import Thinning
 
 BACKGROUND = ((0.085, 0.088, 0.095), (0.150, 0.155, 0.165))
 _MARKER_PX = 13.0
+RESTS_AFTER_S = 0.15
+"""Something that is being moved but has not for so long rests: the picture gets finer."""
+REFINEMENT = 4.0
+"""Each frame of a picture at rest may take so many times as long as the one before."""
 
 
 class Viewport:
@@ -39,6 +44,10 @@ class Viewport:
     Parts to work with: `splats` (what is shown and how), `camera`, `gizmo`,
     `markers`, `rings`, `cage`, `triad`. The camera and the gizmo are models that do
     not ask for frames: call `camera_moved` and `gizmo_changed` after them.
+
+    `drawn` is what the last frame drew. A host that sets ``refine_in`` promises to draw again in so many seconds
+    when asked by it: pictures then become finer frame by frame once nothing
+    moves. Without it the picture at rest is drawn in full at once.
 
     Parameters
     ----------
@@ -85,12 +94,19 @@ class Viewport:
         self.rings = Rings(self._overlay)
         self.cage = CageOutline(self.rings)
         self.triad = AxesTriad(self._corner, scale)
-        self.thinning = Thinning()
+        self.quality = QualityChooser(scale=scale)
+        self.refine_in: Callable[[float], None] | None = None
+        self._magnifier = Magnifier(self.renderer)
+        self.drawn = FrameQuality(0)
+        self._shown: tuple[object, ...] = ()
+        self._rests_since = 0.0
+        self._refined = 0
         self._motions = 0
         self._frame_start = 0.0
         self.set_background(*BACKGROUND)
         self._observed = [
             (self.renderer, self.renderer.AddObserver(vtkCommand.StartEvent, self._on_frame_started)),
+            (self.renderer, self.renderer.AddObserver(vtkCommand.EndEvent, lambda *_: self._magnifier.end())),
             (window, window.AddObserver(vtkCommand.StartEvent, self._on_window_started)),
             (window, window.AddObserver(vtkCommand.EndEvent, self._on_window_ended)),
         ]
@@ -101,6 +117,8 @@ class Viewport:
             subject.RemoveObserver(tag)
         self._observed = []
         self.request_render = self.splats.request_render = lambda: None
+        self.refine_in = None
+        self._magnifier.close()
         self.splats.view_turned = None
         self.splats.clear()
         for part in (self._gizmo_actor, self.markers, self.rings, self.triad):
@@ -118,18 +136,18 @@ class Viewport:
 
     def set_scale(self, scale: float) -> None:
         """Device pixels per logical pixel, as when the window moves to another screen."""
-        self.gizmo.scale = self.triad.scale = scale
+        self.gizmo.scale = self.triad.scale = self.quality.scale = scale
         self.markers.set_size(_MARKER_PX * scale)
         self.splats.set_scale(scale)
 
     # Motion -------------------------------------------------------------------------------------------------------
 
     def begin_motion(self) -> None:
-        """Something moves from here on: splats are left out if the machine cannot draw all of them in time."""
+        """Something moves from here on: the picture gets coarser if the machine cannot draw all of it in time."""
         self._motions += 1
 
     def end_motion(self) -> None:
-        """It rests: once nothing else moves, all splats are drawn."""
+        """It rests: once nothing else moves, all of the picture is drawn."""
         self._motions = max(self._motions - 1, 0)
         if not self._motions:
             self.request_render()
@@ -239,12 +257,13 @@ class Viewport:
     # Frames -------------------------------------------------------------------------------------------------------
 
     def _on_frame_started(self, *_: object) -> None:
-        box, actor = self.splats.bounds(), self.splats.deformed
+        box, actor = self.splats.bounds(of_drawn=self.is_moving), self.splats.deformed
         if box is not None and actor is not None:
             self.camera.fit_clipping(box, actor.subject.corners)
         projection = self.projection
-        thinning = self.thinning.choose(actor.n_splats) if actor and self.is_moving else 1
-        self.splats.prepare(projection, thinning, self._background)
+        self.drawn = quality = self._next_quality(projection)
+        # The projection is that of the whole window: what follows shrinks the renderer until its frame is done.
+        self.splats.prepare(projection, quality, self._magnifier.begin(quality.coarseness), self._background)
         self._overlay_camera(projection)
         self.markers.set_viewport_size(projection.width, projection.height)
         self._gizmo_actor.refresh(projection)
@@ -265,5 +284,36 @@ class Viewport:
         self._frame_start = perf_counter()
 
     def _on_window_ended(self, *_: object) -> None:
-        if self.splats.deformed:
-            self.thinning.note(perf_counter() - self._frame_start, self.splats.deformed.n_drawn)
+        actor = self.splats.deformed
+        if actor is None:
+            return
+        self.quality.note(perf_counter() - self._frame_start, self.drawn)
+        if self.refine_in and self.drawn != FrameQuality(actor.n_splats):
+            if not self.is_moving:
+                self.refine_in(0.0)
+            elif self._refined == 0:
+                self.refine_in(RESTS_AFTER_S)
+
+    def _next_quality(self, projection: Projection) -> FrameQuality:
+        """What the frame that starts draws: the coarser, the more lately what it shows has moved."""
+        actor = self.splats.deformed
+        if actor is None:
+            return FrameQuality(0)
+        now = perf_counter()
+        size = projection.width, projection.height
+        look = (self.splats.mode, self.splats.compare, actor, size)
+        # Not the clipping planes: they follow from what is drawn.
+        camera = projection.view_from_world.tobytes(), projection.clip_from_view[:2].tobytes()
+        shows = (*look, *camera, actor.vtk_points.GetMTime())
+        if look != self._shown[: len(look)]:
+            self.quality.forget()
+        if shows != self._shown:
+            self._shown, self._rests_since, self._refined = shows, now, 0
+        elif not self.is_moving or now - self._rests_since >= RESTS_AFTER_S:
+            self._refined += 1
+        full = FrameQuality(actor.n_splats)
+        if self.is_moving:
+            return self.quality.choose(actor.by_contribution, REFINEMENT ** min(self._refined, 1))
+        if self.refine_in is None:
+            return full
+        return self.quality.choose(actor.by_contribution, REFINEMENT ** (self._refined + 1))

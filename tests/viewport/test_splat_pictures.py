@@ -56,7 +56,7 @@ def test_ellipses_are_the_occupancy_ellipses(is_parallel, is_sheared):
         viewport.splats.look = PLAIN_ELLIPSES
         viewport.renderer.GetRenderWindow().Render()
         viewport.begin_motion()  # without the smoothing of the picture at rest
-        viewport.thinning.target_s = np.inf
+        viewport.quality.target_s = np.inf
         picture = drawn(viewport)
         reference, _ = ellipses_picture(
             viewport.projection, glyphs.means, glyphs.axes_u, glyphs.axes_v, glyphs.cutoffs, rgba[:, :3], BACKGROUND
@@ -70,7 +70,7 @@ def test_points_are_discs_of_constant_size():
     with canvas(glyphs, rgba) as viewport:
         viewport.splats.look = SplatLook(DisplayMode.POINTS, point_size_px=3.0)
         viewport.begin_motion()
-        viewport.thinning.target_s = np.inf
+        viewport.quality.target_s = np.inf
         picture = drawn(viewport)
         reference, _ = points_picture(viewport.projection, glyphs.means, rgba[:, :3], 3.0, BACKGROUND)
         assert (np.abs(picture - reference).max(axis=-1) > 0.01).mean() < 2e-3
@@ -108,21 +108,6 @@ def test_a_scene_far_from_zero_looks_as_sharp():
         viewport.camera.view = replace(view, position=view.position + shift, focal_point=view.focal_point + shift)
         # Three million units away a float64 still resolves 1e-9 of them: a rounded byte here and there.
         assert np.abs(drawn(viewport) - near).max() <= 2.0 / 255.0
-
-
-def test_thinned_splats_cover_about_as_much():
-    glyphs, rgba = random_splats(4000, size=0.02)
-    with canvas(glyphs, rgba) as viewport:
-        viewport.splats.look = PLAIN_ELLIPSES
-        whole = (np.abs(drawn(viewport) - 0.1).max(axis=-1) > 0.02).mean()
-        viewport.begin_motion()
-        viewport.thinning.least_drawn = 1
-        for _ in range(3):
-            viewport.thinning.note(1.0, 4000)
-        viewport.thinning.target_s = 0.3
-        thinned = (np.abs(drawn(viewport) - 0.1).max(axis=-1) > 0.02).mean()
-        assert viewport.splats.deformed.n_drawn == 1000
-        assert thinned == pytest.approx(whole, rel=0.15)
 
 
 def test_selection_tints_and_clears():

@@ -10,7 +10,6 @@ from splap_editor.viewport.overlays import Mark, circle
 from splap_editor.viewport.screenshot import screenshot
 from splap_editor.viewport.splat_actor import DisplayMode, SplatLook
 from splap_editor.viewport.splat_scene import Compare
-from splap_editor.viewport.thinning import STEPS, Thinning
 from splap_editor.viewport.viewport import Viewport
 from tests.reference.rasterizer import psnr
 from tests.viewport.canvas import BACKGROUND, VIEW, canvas, drawn, random_splats
@@ -45,62 +44,6 @@ def test_changes_ask_for_frames_and_never_draw_them():
         assert not frames
         drawn(viewport)
         assert len(frames) == 1
-
-
-def test_rest_draws_all_splats_again():
-    glyphs, rgba = random_splats(1000)
-    with canvas(glyphs, rgba) as viewport:
-        viewport.begin_motion()
-        viewport.begin_motion()
-        viewport.thinning.least_drawn = 1
-        for _ in range(3):
-            viewport.thinning.note(1.0, 1000)
-        drawn(viewport)
-        assert viewport.splats.deformed.n_drawn < 1000
-        viewport.end_motion()
-        assert viewport.is_moving
-        viewport.end_motion()
-        drawn(viewport)
-        assert viewport.splats.deformed.n_drawn == 1000
-
-
-def test_thinning_meets_the_target_and_settles():
-    thinning = Thinning(target_s=0.05, least_drawn=1)
-    assert thinning.choose(100_000) == 1
-    for _ in range(6):
-        k = thinning.choose(100_000)
-        thinning.note(0.3 / k, 100_000 // k)
-    assert thinning.choose(100_000) == 8
-    assert {thinning.choose(100_000) for _ in range(20)} == {8}
-
-
-def test_thinning_takes_one_slow_frame_for_a_shader_being_compiled():
-    thinning = Thinning(target_s=0.05)
-    for seconds in (0.01, 0.01, 2.0):
-        thinning.note(seconds, 1000)
-    assert thinning.choose(1000) == 1
-
-
-def test_thinning_has_a_coarsest_step():
-    thinning = Thinning(target_s=1e-9)
-    thinning.note(1.0, 10_000_000)
-    assert thinning.choose(10_000_000) == STEPS[-1]
-
-
-def test_thinning_leaves_enough_to_be_recognised():
-    thinning = Thinning(target_s=1e-9)
-    thinning.note(1.0, 90_000)
-    assert thinning.choose(90_000) == 4
-    assert Thinning(target_s=1e-9).choose(11_000) == 1
-
-
-def test_thinning_that_buys_no_time_is_taken_back():
-    thinning = Thinning(target_s=0.05)
-    for _ in range(12):
-        k = thinning.choose(1_000_000)
-        # The pixels take 200 ms however many splats cover them, a million splats 10 ms more.
-        thinning.note(0.2 + 0.01 / k, 1_000_000 // k)
-    assert thinning.choose(1_000_000) == 1
 
 
 def test_host_is_told_when_the_view_turns_and_not_when_it_rests():
