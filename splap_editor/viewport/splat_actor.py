@@ -204,6 +204,7 @@ class SplatActor:
         self._given: tuple[NDArray[np.floating], ...] | None = None
         self.shape, self.colors, self.flags = self._all.shape, self._all.colors, self._all.flags
         self.vtk_points = self._all.vtk_points
+        self.n_moves = 0
         self._few: _Cloud | None = None
         self._few_rows = np.empty(0, np.int32)
         self._few_sorted_along: NDArray[np.float64] | None = None
@@ -247,6 +248,7 @@ class SplatActor:
         The arrays must not change afterwards: while only some splats are drawn, the others are read when wanted.
         """
         self._given = (means, axes_u, axes_v)
+        self.n_moves += 1
         if self._few is None:
             self.settle()
         else:
@@ -328,8 +330,7 @@ class SplatActor:
             # In file order, which is kinder to the cache and to whoever compares pictures.
             self._few_rows = np.sort(self.by_contribution.rows[: quality.n_drawn])
             self._few = _Cloud(quality.n_drawn)
-            self._few_sorted_along = None
-            self._modified(*ARRAYS)
+            self._fill_few(*ARRAYS)
             self._few.draw(np.arange(quality.n_drawn, dtype=np.int32))
         self.actor.SetMapper((self._few or self._all).mapper)
 
@@ -427,12 +428,16 @@ class SplatActor:
 
     def _modified(self, *names: str) -> None:
         self._all.modified(*names)
-        if self._few is not None:
-            for name in names:
-                np.take(getattr(self._all, name), self._few_rows, axis=0, out=getattr(self._few, name))
-            self._few.modified(*names)
-            if "means" in names:
-                self._few_sorted_along = None
+        self._fill_few(*names)
+
+    def _fill_few(self, *names: str) -> None:
+        if self._few is None:
+            return
+        for name in names:
+            np.take(getattr(self._all, name), self._few_rows, axis=0, out=getattr(self._few, name))
+        self._few.modified(*names)
+        if "means" in names:
+            self._few_sorted_along = None
 
     def _mix_tints(self) -> None:
         if self._tints is None:

@@ -304,7 +304,7 @@ class Viewport:
         look = (self.splats.mode, self.splats.compare, actor, size)
         # Not the clipping planes: they follow from what is drawn.
         camera = projection.view_from_world.tobytes(), projection.clip_from_view[:2].tobytes()
-        shows = (*look, *camera, actor.vtk_points.GetMTime())
+        shows = (*look, *camera, actor.n_moves)
         if look != self._shown[: len(look)]:
             self.quality.forget()
         if shows != self._shown:
