@@ -205,6 +205,7 @@ class SplatActor:
         self.shape, self.colors, self.flags = self._all.shape, self._all.colors, self._all.flags
         self.vtk_points = self._all.vtk_points
         self.n_moves = 0
+        self._few_for: tuple[int, int] | None = None
         self._few: _Cloud | None = None
         self._few_rows = np.empty(0, np.int32)
         self._few_sorted_along: NDArray[np.float64] | None = None
@@ -302,6 +303,8 @@ class SplatActor:
 
     def set_flags(self, flags: NDArray[np.uint8]) -> None:
         """Overwrite the state of all splats, (N,) uint8 of `SplatFlag` bits."""
+        if ((self.flags ^ flags) & SplatFlag.HIDDEN).any():
+            self._few_for = None
         self.flags[:] = flags
         self._modified("flags")
 
@@ -316,23 +319,27 @@ class SplatActor:
         self._all.draw(np.arange(self.n_splats, dtype=np.int32) if order is None else order)
 
     def set_quality(self, quality: FrameQuality) -> None:
-        """Draw so many splats, those that give most, for a picture of so coarse pixels."""
+        """Draw so many splats, those that give most of what is not hidden, for a picture of so coarse pixels."""
         if quality.coarseness != self._coarseness:
             self._coarseness = quality.coarseness
             self._set_coarseness()
-        if quality.n_drawn == self.n_drawn:
-            return
-        self.settle()
+        wanted = quality.n_drawn, self.cut_byte
         if quality.n_drawn >= self.n_splats:
-            self._few = None
-            self._few_rows = np.empty(0, np.int32)
-        else:
-            # In file order, which is kinder to the cache and to whoever compares pictures.
-            self._few_rows = np.sort(self.by_contribution.rows[: quality.n_drawn])
-            self._few = _Cloud(quality.n_drawn)
+            if self._few is not None:
+                self.settle()
+                self._few = self._few_for = None
+                self.actor.SetMapper(self._all.mapper)
+        elif wanted != self._few_for:
+            self.settle()
+            self._few_for = wanted
+            rows = self.by_contribution.rows
+            seen = (self.flags & SplatFlag.HIDDEN == 0) & (self._untinted[:, 3] >= self.cut_byte)
+            # In file order, which is kinder to the cache.
+            self._few_rows = np.sort(rows[seen[rows]][: quality.n_drawn])
+            self._few = _Cloud(len(self._few_rows))
             self._fill_few(*ARRAYS)
-            self._few.draw(np.arange(quality.n_drawn, dtype=np.int32))
-        self.actor.SetMapper((self._few or self._all).mapper)
+            self._few.draw(np.arange(len(self._few_rows), dtype=np.int32))
+            self.actor.SetMapper(self._few.mapper)
 
     @property
     def is_thinned(self) -> bool:

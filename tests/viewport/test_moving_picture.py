@@ -7,7 +7,7 @@ from splap_editor.viewport import viewport as viewport_module
 from splap_editor.viewport.frame_quality import FrameQuality
 from splap_editor.viewport.gizmo_parts import PARTS
 from splap_editor.viewport.glyphs import Glyphs
-from splap_editor.viewport.splat_actor import DisplayMode, SplatLook
+from splap_editor.viewport.splat_actor import DisplayMode, SplatFlag, SplatLook
 from tests.reference.rasterizer import psnr
 from tests.viewport.canvas import canvas, drawn, random_splats
 
@@ -103,6 +103,27 @@ def test_a_drag_moves_the_splats_that_are_drawn_and_then_all(mode):
         )
         viewport.end_motion()
         np.testing.assert_array_equal(drawn(viewport), expected_all)
+
+
+@pytest.mark.parametrize("mode", LOOKS)
+def test_what_is_hidden_or_too_faint_takes_no_place_among_the_few(mode):
+    glyphs, rgba = random_splats(600)
+    with canvas(glyphs, rgba, size=SIZE) as viewport:
+        viewport.splats.look = SplatLook(mode, opacity_cut=0.3)
+        rows = viewport.splats.deformed.by_contribution.rows
+        flags = np.zeros(600, np.uint8)
+        flags[rows[:400]] = SplatFlag.HIDDEN
+        viewport.splats.set_flags(flags)
+        full = drawn(viewport)
+        viewport.begin_motion()
+        always(viewport, FrameQuality(200))
+        few = drawn(viewport)
+        actor = viewport.splats.deformed
+        assert actor.n_drawn == (actor.base_colors[rows[400:], 3] >= actor.cut_byte).sum() > 50
+        if mode is DisplayMode.SPLATS:
+            np.testing.assert_array_equal(few, full)
+        viewport.splats.set_flags(np.zeros(600, np.uint8))
+        assert psnr(drawn(viewport), full) < 30.0
 
 
 def test_colours_and_flags_reach_a_thinned_picture():
