@@ -5,7 +5,7 @@ from time import sleep
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QCoreApplication
+from PySide6.QtCore import QCoreApplication, Qt
 from PySide6.QtGui import QKeySequence
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
@@ -13,15 +13,20 @@ from PySide6.QtWidgets import QApplication
 from splap_editor.core.handle_nodes import Region
 from splap_editor.core.pose import Pose
 from splap_editor.engine.keyframes import edit_at_frame, keyed_edit
+from splap_editor.session.pivot import Pivot
+from splap_editor.tools.brush_tool import BrushOptions
+from splap_editor.tools.handle_tool import HandleOptions
+from splap_editor.tools.pin_tool import PinOptions
 from splap_editor.tools.tool_table import TOOLS
+from splap_editor.tools.transform_tool import TransformTool
 from splap_editor.ui.actions.action_table import ACTIONS
 
 WAIT_MS = 20_000
 
 ELSEWHERE = {
-    "file.quit": "ends the window",
+    "file.quit": "test_jobs_and_leaving",
     "file.open_sample": "test_documents",
-    "view.full_screen": "a matter of the window manager",
+    "view.full_screen": "below",
     "edit.stop": "test_jobs_and_leaving",
     "edit.resume": "test_jobs_and_leaving",
     "display.weights": "test_weights",
@@ -41,7 +46,7 @@ def seen(driver):
     return (
         id(scene),
         scene.shown_edit,
-        scene.active_handles,
+        (scene.active_handles, scene.active_pins, scene.pivot),
         (scene.selection.tobytes(), scene.hidden.tobytes(), tuple(scene.selection_sets)),
         (window.display.options, window.inspection.graph_view.options, id(window.inspection.graph_actions.kept)),
         (window.tools.chosen.name, window.toast.text, window.view.viewport.gizmo.is_local),
@@ -71,9 +76,12 @@ def prepared(driver, spec, edit):
     if driver.session.history.can_redo:
         driver.session.history.redo()
     window.timeline_actions.play(False)
+    # A flight that the key before began would go on, and pass for an effect of this one.
+    driver.qtbot.waitUntil(lambda: not window.view.viewport.is_moving, timeout=WAIT_MS)
     frame = 1 if spec.action_id == "timeline.delete_key" else 5
     scene.set_edit(edit_at_frame(edit, frame))
     scene.set_active_handles((edit.handles[0].handle_id,))
+    scene.set_pivot(Pivot.ACTIVE if spec.action_id == "handle.pivot_median" else Pivot.MEDIAN)
     scene.set_hidden(np.arange(n) < 20)
     scene.set_selection((np.arange(n) > 900) & (np.arange(n) < 1200))
     window.display.set(mode="points" if spec.action_id == "display.splats" else "splats")
@@ -106,15 +114,16 @@ def close_what_opened(driver):
 
 
 @pytest.mark.parametrize("how", ["key", "click", "key while frames are slow"])
-def test_every_action_has_an_effect(driver, quiet, how):
+def test_every_action_has_an_effect(driver, how):
     window, edit = driver.window, base_edit(driver)
     if "slow" in how:
         window.viewport.frame_drawn.connect(slow_frame)
     how = how.split()[0]
     driver.wait_idle()
     dead = []
-    for spec in ACTIONS:
-        if spec.action_id in ELSEWHERE or (how == "key" and not spec.shortcuts):
+    ways = [(spec, keys) for spec in ACTIONS for keys in (spec.shortcuts if how == "key" else ("",))]
+    for spec, keys in ways:
+        if spec.action_id in ELSEWHERE:
             continue
         close_what_opened(driver)
         prepared(driver, spec, edit)
@@ -122,15 +131,95 @@ def test_every_action_has_an_effect(driver, quiet, how):
         before = seen(driver)
         if not action.isEnabled():
             dead.append(f"{spec.action_id} is off")
-        elif how == "key":
-            pressed = QKeySequence(spec.shortcuts[0])[0]
+            continue
+        if how == "key":
+            pressed = QKeySequence(keys)[0]
             QTest.keyClick(window.viewport, pressed.key(), pressed.keyboardModifiers())
         else:
             action.trigger()
         try:
             driver.qtbot.waitUntil(lambda before=before: seen(driver) != before, timeout=WAIT_MS)
         except driver.qtbot.TimeoutError:
-            dead.append(spec.action_id)
+            dead.append(f"{spec.action_id} {keys}")
     close_what_opened(driver)
     driver.session.halt()
     assert dead == []
+
+
+def test_full_screen_and_back(driver):
+    for is_full in (True, False):
+        driver.key(Qt.Key.Key_F11)
+        driver.qtbot.waitUntil(lambda is_full=is_full: driver.window.isFullScreen() == is_full)
+
+
+GESTURES = ("lick", "rag", "heel", "inch", "ingers", "ress", "elease", "ove")
+
+
+def tool_keys():
+    """Every key that the tables of the tools tell of, with the tool it is told for."""
+    standing = [("handle", row) for row in (*TransformTool.bindings, *TransformTool.active_bindings)]
+    rows = [*standing, *((entry.name, row) for entry in TOOLS for row in entry.kind.bindings)]
+    for name, row in rows:
+        for text in row.chords if row.sentence else ():
+            if not text.endswith(GESTURES):
+                yield name, row, text
+
+
+def tool_state(driver):
+    """What a key of a tool may change."""
+    gizmo, context = driver.window.view.viewport.gizmo, driver.window.tools.context
+    return (
+        gizmo.dragged,
+        (driver.scene.shown_edit, driver.scene.preview is None),
+        (context.hud.text, context.held(HandleOptions).value, context.held(PinOptions).value),
+        (context.held(BrushOptions).value, context.inspected.edge, driver.scene.picked),
+        (window_tool(driver, "separate").parts, window_tool(driver, "separate").wider),
+    )
+
+
+def window_tool(driver, name):
+    return driver.window.tools.tools[name]
+
+
+def ready_for(driver, name, row, text):
+    """Bring a tool to where its key changes something."""
+    context = driver.window.tools.context
+    if row in TransformTool.active_bindings:
+        # Of three transforms by key each can be changed for another.
+        driver.key(Qt.Key.Key_R if text == "G" else Qt.Key.Key_G)
+        driver.key(Qt.Key.Key_1)
+    elif name == "inspect":
+        graph, rows = driver.scene.surface.graph, driver.scene.ellipses.rows
+        pair = int(rows[0]), int(rows[graph.indices[0]])
+        context.inspected.pick(pair[0])
+        context.inspected.pick_edge(pair)
+    elif name == "separate" and text in ("Return", "Enter"):
+        # With nothing pointed at, it parts the selection from the rest.
+        driver.scene.set_selection(driver.scene.splats.means[:, 0] > 0.0)
+    elif name == "separate":
+        at, ratio = driver.surface_pixel(), driver.window.viewport.devicePixelRatioF()
+        for _ in range(2):
+            window_tool(driver, name).take_part([(at.x() * ratio, at.y() * ratio)])
+
+
+@pytest.mark.parametrize("frame_s", [0.0, 0.3])
+def test_every_key_of_a_tool_has_an_effect(driver, frame_s):
+    edit, window, dead, seen_keys = base_edit(driver), driver.window, [], 0
+    driver.wait_idle()
+    window.viewport.frame_drawn.connect(lambda _: sleep(frame_s))
+    for name, row, text in tool_keys():
+        window.tools.cancel()
+        driver.scene.set_edit(edit)
+        driver.scene.set_active_handles((edit.handles[0].handle_id,))
+        window.tools.choose(name)
+        driver.wait_idle()
+        ready_for(driver, name, row, text)
+        before = tool_state(driver)
+        pressed = QKeySequence(text.removeprefix("Any+").replace("Number", "7"))[0]
+        driver.key(pressed.key(), pressed.keyboardModifiers())
+        seen_keys += 1
+        if tool_state(driver) == before:
+            dead.append(f"{name}: {text}")
+    window.tools.cancel()
+    driver.session.halt()
+    assert seen_keys > 20 and dead == []
