@@ -164,7 +164,8 @@ class DocumentActions:
         dialog.open()
 
     def _on_autosave_failed(self, error: Exception) -> None:
-        self._toast.fail(f"The edit cannot be kept for recovery: {sentence(error)} Save it yourself now and then.")
+        advice = "Save the session yourself now and then."
+        self._toast.fail(f"The edit cannot be kept for recovery: {sentence(error)} {advice}")
 
     def _forget_after_save(self) -> None:
         self._after_save = None

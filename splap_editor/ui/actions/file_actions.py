@@ -114,10 +114,10 @@ class FileActions:
         QSettings().setValue("files/folder", str(dialog.path.parent))
         self._session.export(dialog.path, as_3dgs=dialog.as_3dgs, columns=dialog.column_names)
 
-    def save_edit(self) -> None:
+    def export_edit(self) -> None:
         """Ask where to, and write the edit as a recipe."""
         source = self._session.shown_scene.file.path
-        dialog = QFileDialog(self._window, "Save the edit", str(folder_to_write(source) / f"{source.stem}_edit.json"))
+        dialog = QFileDialog(self._window, "Export the edit", str(folder_to_write(source) / f"{source.stem}_edit.json"))
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.setNameFilter(EDIT_FILTER)
         dialog.setDefaultSuffix("json")
@@ -127,9 +127,9 @@ class FileActions:
         try:
             self._session.save_edit(path)
         except (OSError, ValueError) as error:
-            self._toast.fail(f"The edit was not saved: {sentence(error)}")
+            self._toast.fail(f"The edit was not exported: {sentence(error)}")
         else:
-            self._toast.say(f"Saved the edit as {path.name}.")
+            self._toast.say(f"Exported the edit as {path.name}.")
 
     def picture(self) -> None:
         """Ask for a size, and write the view as a PNG."""
@@ -149,8 +149,8 @@ class FileActions:
         scene = self._session.shown_scene
         box = PlainMessageBox(
             QMessageBox.Icon.NoIcon,
-            "Save the edit?",
-            f"The edit of {scene.file.path.name} has not been saved.",
+            "Save the session?",
+            f"Your work on {scene.file.path.name} has not been saved.",
             parent=self._window,
         )
         box.setInformativeText("It is lost when another file is opened or the window is closed.")
