@@ -15,6 +15,8 @@ Rgba = tuple[int, int, int, int]
 
 HANDLE_SHARE = 165
 PIN_SHARE = 150
+WIDE_PIN_SHARE = 60
+"""Of a pin that is no disc but, as likely as not, most of the object: its own colours are to be seen."""
 
 FIXED_TINTS: Mapping[str, Rgba | None] = {
     "auto": None,
@@ -60,7 +62,8 @@ def edit_tints(scene: Scene, bound: BoundEdit | None, fixed: Rgba) -> NDArray[np
         rows, labels = scene.ellipses.rows[bound.handles.indices], bound.handles.labels
         tints[rows[labels < 0]] = fixed
     for pin in scene.edit.pins:
-        tints[pin_rows(scene, pin)] = (*rgb(PIN_COLOR), PIN_SHARE)
+        share = WIDE_PIN_SHARE if pin.reach is None else PIN_SHARE
+        tints[pin_rows(scene, pin)] = (*rgb(PIN_COLOR), share)
     if bound is not None:
         palette = np.array([(*rgb(handle.color), HANDLE_SHARE) for handle in scene.edit.active_handles], np.uint8)
         tints[rows[labels >= 0]] = palette[labels[labels >= 0]]

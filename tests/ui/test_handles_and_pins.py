@@ -1,5 +1,7 @@
 """Handles and pins in the list: several chosen, named, resized and deleted one by one."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from PySide6.QtCore import QCoreApplication, QPoint, Qt
@@ -152,12 +154,17 @@ def test_shift_and_the_right_button_place_the_pivot(driver):
     assert driver.scene.pivot is Pivot.MEDIAN
 
 
-def test_nothing_below_the_list_jumps_when_handles_and_pins_appear(driver):
+@pytest.mark.parametrize("method", ["arap", "bbw"])
+def test_nothing_below_the_list_jumps_when_handles_and_pins_appear(driver, method):
     window = driver.window
+    driver.session.change_edit(replace(driver.scene.edit, method=method), "Change method")
+    driver.wait_idle()
     below = [window.handles_panel.pose_form, window.deformer_panel.method, window.display_panel]
 
     def places():
-        QCoreApplication.processEvents()
+        # A text, the room it needs and where that is found come in turn.
+        for _ in range(5):
+            QCoreApplication.processEvents()
         return [part.mapTo(window.dock, QPoint(0, 0)).y() for part in below]
 
     before = places()

@@ -159,6 +159,7 @@ def test_the_choice_of_a_method_says_what_an_artist_calls_it(driver):
     method = driver.window.deformer_panel.method
     tips = [method.itemData(index, Qt.ItemDataRole.ToolTipRole) for index in range(method.count())]
     assert all(tips) and "keeps shape" in tips[method.findData("arap")]
+    assert method.toolTip() == tips[method.currentIndex()]
 
 
 def cut_labels(window):
@@ -173,7 +174,8 @@ def test_no_line_of_the_panels_is_cut_while_the_surface_is_prepared_again(driver
     for tip in (centers[:, 2].argmin(), centers[:, 2].argmax()):
         driver.session.add_handle(Region(centers[tip], 0.1))
     driver.wait_idle()
-    assert len(driver.window.deformer_panel.weights.lines) == 2
+    driver.window.deformer_panel.details.header.click()
+    assert len(driver.window.deformer_panel.figures.text().splitlines()) == 4
     epsilon = replace(driver.scene.edit.graph, epsilon=0.01)
     driver.session.change_edit(driver.scene.edit.with_options(epsilon), "Change gap")
     # A text, the room it needs and where that is found come in turn.

@@ -45,6 +45,22 @@ def test_no_widget_takes_a_hostile_name_for_a_document(driver, tmp_path):
     assert HOSTILE in window.toast.text
 
 
+def test_no_label_shows_tags(driver):
+    window = driver.window
+    driver.key(Qt.Key.Key_I)
+    driver.click(driver.surface_pixel())
+    window.inspection.inspected.set(kind="graph", other="euclidean")
+    window.inspection.graph_view.set(shown="all")
+    row = driver.scene.picked
+    node = driver.scene.ellipses.node_of_row[row]
+    graph = driver.scene.surface.graph
+    other = int(driver.scene.ellipses.rows[graph.indices[graph.indptr[node]]])
+    window.inspection.inspected.pick_edge((row, other))
+    texts = [label.text() for label in window.findChildren(QLabel)]
+    assert any("by both" in text for text in texts) and any(text.startswith("Edge ") for text in texts)
+    assert [text for text in texts if re.search("<[a-z/]", text)] == []
+
+
 def test_labels_and_boxes_are_made_by_one_constructor():
     package = Path(splap_editor.__file__).parent
     own = package / "ui" / "widgets" / "plain_text.py"

@@ -14,7 +14,7 @@ from splap_editor.engine.edit import Edit
 from splap_editor.session.scene import Scene
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
-from splap_editor.session.weight_report import weight_figures
+from splap_editor.session.weight_report import weight_figures, weight_lines
 from splap_editor.ui.panels.details import Details
 from splap_editor.ui.panels.weights_form import WeightsForm
 from splap_editor.ui.theme import STEP
@@ -107,7 +107,9 @@ class DeformerPanel(QWidget):
         if bound is None:
             return []
         if bound.weighted is not None:
-            return weight_figures(bound.edit, bound.weighted.report)
+            report = bound.weighted.report
+            words = [text for text, tone in weight_lines(bound.edit, report) if tone == "quiet"]
+            return words + weight_figures(bound.edit, report)
         deformation = scene.deformation if scene is not None else None
         if deformation is None or not deformation.n_iterations:
             return []
@@ -118,7 +120,7 @@ class DeformerPanel(QWidget):
         return {
             "empty": ("Nothing is open.", "quiet"),
             "opening": ("Opening the file.", "quiet"),
-            "preparing": ("Preparing the surface; handles can be placed meanwhile.", ""),
+            "preparing": ("Preparing: handles can be placed.", ""),
             "ready": ("At rest: no handle is placed.", "quiet"),
             "binding": ("Getting ready to bend.", ""),
             "dragging": ("Following the drag.", ""),
@@ -138,6 +140,7 @@ class DeformerPanel(QWidget):
         self.method.blockSignals(True)
         self.method.setCurrentIndex(self.method.findData(edit.method))
         self.method.blockSignals(False)
+        self.method.setToolTip(method_tips()[edit.method])
         row, free = edit.deformer, edit.options[ReachOptions].free_radius
         for group, form in self.forms.items():
             form.setVisible(group is row.options)

@@ -142,7 +142,7 @@ class GraphPanel(QWidget):
         text = f"{graph.n_edges:,} edges, {2 * graph.n_edges / max(graph.n_nodes, 1):.3g} at a splat"
         made = self._view.colored
         if self._view.options.shown != "off":
-            text += f"<br>{self._view.n_shown:,} in view"
+            text += f"\n{self._view.n_shown:,} in view"
             if made is not None and np.isfinite(made.high):
                 text += f"; {EDGE_COLORS[made.color].lower()} from {made.low:.3g} (dark) to {made.high:.3g} (bright)"
         self.counts.setText(text)

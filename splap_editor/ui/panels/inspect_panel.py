@@ -22,6 +22,9 @@ from splap_editor.viewport.inspect_view import BOTH_COLOR, FIRST_COLOR, SECOND_C
 HINT = "Take the Inspect tool (I) and click a splat."
 
 
+Rgb = tuple[int, int, int]
+
+
 class InspectPanel(QWidget):
     """Says what is known of the picked splat and edge; chooses whose neighbours are shown."""
 
@@ -44,7 +47,7 @@ class InspectPanel(QWidget):
         self.k = NumberField(1, 500, decimals=0, step=1)
         self.k.setToolTip("How many neighbours, where the kind does not say itself")
         self.k.committed.connect(lambda k: inspected.set(k=int(k)))
-        self.counts = _text_label()
+        self.counts = ColoredLines()
         self.edge = _text_label()
         self.epsilon = NumberField(0.0, 100.0, decimals=4, step=0.05, unit="%")
         self.epsilon.setToolTip("Would the edge survive at this gap, in percent of the size of the scene?")
@@ -104,20 +107,21 @@ class InspectPanel(QWidget):
         for part in (self._sets, self.counts):
             part.setVisible(picked is not None and both is not None)
         if both is not None:
-            self.counts.setText(self._counts_text(both))
+            self.counts.show_lines(self._count_lines(both))
         self._show_edge()
 
-    def _counts_text(self, both: NeighborComparison) -> str:
+    def _count_lines(self, both: NeighborComparison) -> list[tuple[Rgb, str]]:
+        """How many neighbours are of which set, each line with the colour they are marked in."""
         options = self._inspected.options
-        first = f"{_dot(FIRST_COLOR)} {len(both.first)} by {_words(options.kind)}"
+        first = f"{len(both.first)} by {_words(options.kind)}"
         if not options.other:
-            return first
-        second = f"{_dot(SECOND_COLOR)} {len(both.second)} by {_words(options.other)}"
-        return (
-            f"{first}, {len(both.only_first)} by it alone<br>"
-            f"{second}, {len(both.only_second)} by it alone<br>"
-            f"{_dot(BOTH_COLOR)} {len(both.common)} by both"
-        )
+            return [(FIRST_COLOR, first)]
+        second = f"{len(both.second)} by {_words(options.other)}"
+        return [
+            (FIRST_COLOR, f"{first}, {len(both.only_first)} by it alone"),
+            (SECOND_COLOR, f"{second}, {len(both.only_second)} by it alone"),
+            (BOTH_COLOR, f"{len(both.common)} by both"),
+        ]
 
     def _show_edge(self) -> None:
         scene, rows = self._session.scene, self._inspected.edge
@@ -161,12 +165,45 @@ class InspectPanel(QWidget):
             self.verdict.setText(f"There: {touch}. {self._preview.error or 'Making the graph …'}")
 
 
+class ColoredLines(QWidget):
+    """Lines of text, each behind a dot of the colour it speaks of."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._grid = QGridLayout(self)
+        self._grid.setContentsMargins(0, 0, 0, 0)
+        self._grid.setHorizontalSpacing(STEP)
+        self._grid.setVerticalSpacing(STEP)
+        self._grid.setColumnStretch(1, 1)
+        self._lines: list[tuple[QLabel, QLabel]] = []
+
+    def show_lines(self, lines: list[tuple[Rgb, str]]) -> None:
+        """Show these lines in place of those before."""
+        while len(self._lines) < len(lines):
+            dot, line = PlainLabel("●"), _text_label()
+            self._grid.addWidget(dot, len(self._lines), 0, Qt.AlignmentFlag.AlignTop)
+            self._grid.addWidget(line, len(self._lines), 1)
+            self._lines.append((dot, line))
+        for place, (dot, line) in enumerate(self._lines):
+            is_shown = place < len(lines)
+            dot.setVisible(is_shown)
+            line.setVisible(is_shown)
+            if is_shown:
+                color, text = lines[place]
+                dot.setStyleSheet(f"color: rgb{color};")
+                line.setText(text)
+
+    def text(self) -> str:
+        """What is shown, without the dots."""
+        return "\n".join(line.text() for _, line in self._lines if not line.isHidden())
+
+
 def _at(options: GraphOptions, epsilon: float) -> GraphOptions:
     return replace(options, epsilon=epsilon, k=GraphOptions.k)
 
 
 def _splat_text(card: SplatCard) -> str:
-    lines = [f"<b>Row {card.row:,}</b>"]
+    lines = [f"Row {card.row:,}"]
     if card.semi_axes is not None:
         lines.append(f"Semi-axes {card.semi_axes[0]:.4g} × {card.semi_axes[1]:.4g}")
     lines.append(
@@ -181,14 +218,14 @@ def _splat_text(card: SplatCard) -> str:
             f"{card.degree} graph neighbour{'s' if card.degree != 1 else ''}; component {card.component} of "
             f"{card.n_components:,}, {card.component_size:,} splats"
         )
-    return "<br>".join(lines)
+    return "\n".join(lines)
 
 
 def _edge_text(card: EdgeCard, is_joined: bool) -> str:
     there, back = (_length(offset) for offset in card.offsets)
     return (
-        f"<b>{'Edge' if is_joined else 'No edge'} {card.rows[0]:,} – {card.rows[1]:,}</b><br>"
-        f"Length {card.length:.4g}<br>δ {there} there, {back} back; ε {card.epsilon:.4g}<br>"
+        f"{'Edge' if is_joined else 'No edge'} {card.rows[0]:,} – {card.rows[1]:,}\n"
+        f"Length {card.length:.4g}\nδ {there} there, {back} back; ε {card.epsilon:.4g}\n"
         f"Touch scale {_scale(card.touch)}"
     )
 
@@ -203,10 +240,6 @@ def _scale(touch: float) -> str:
 
 def _gap_words(card: EdgeCard) -> str:
     return f"the smaller δ is {'within' if card.is_within else 'beyond'} ε"
-
-
-def _dot(color: tuple[int, int, int]) -> str:
-    return f'<span style="color:rgb{color}">●</span>'
 
 
 def _words(kind: str) -> str:

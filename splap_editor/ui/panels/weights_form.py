@@ -12,7 +12,7 @@ from splap_editor.ui.widgets.plain_text import PlainLabel
 
 
 class WeightsForm(QWidget):
-    """A button that shows the weights on the surface, and a line for each handle."""
+    """A button that shows the weights on the surface, and a line for each thing that is wrong with them."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -37,12 +37,14 @@ class WeightsForm(QWidget):
 
     @property
     def lines(self) -> list[str]:
-        """What is said about the weights."""
+        """What is said to be wrong with the weights."""
         return [label.text() for label in self.labels]
 
     def _show(self) -> None:
         bound = self._session.bound
-        lines = weight_lines(bound.edit, bound.weighted.report) if bound and bound.weighted else []
+        said = weight_lines(bound.edit, bound.weighted.report) if bound and bound.weighted else []
+        # What is in order is told among the details: a line for each handle would push the panel about.
+        lines = [(text, tone) for text, tone in said if tone != "quiet"]
         while len(self.labels) < len(lines):
             label: QLabel = PlainLabel(wordWrap=True, textInteractionFlags=Qt.TextInteractionFlag.TextSelectableByMouse)
             self._lines.addWidget(label)
