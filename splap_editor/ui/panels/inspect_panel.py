@@ -180,7 +180,8 @@ class ColoredLines(QWidget):
     def show_lines(self, lines: list[tuple[Rgb, str]]) -> None:
         """Show these lines in place of those before."""
         while len(self._lines) < len(lines):
-            dot, line = PlainLabel("●"), _text_label()
+            dot: QLabel = PlainLabel("●")
+            line = _text_label()
             self._grid.addWidget(dot, len(self._lines), 0, Qt.AlignmentFlag.AlignTop)
             self._grid.addWidget(line, len(self._lines), 1)
             self._lines.append((dot, line))
