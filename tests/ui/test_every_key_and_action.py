@@ -79,7 +79,11 @@ def prepared(driver, spec, edit):
     # A flight that the key before began would go on, and pass for an effect of this one.
     driver.qtbot.waitUntil(lambda: not window.view.viewport.is_moving, timeout=WAIT_MS)
     frame = 1 if spec.action_id == "timeline.delete_key" else 5
-    scene.set_edit(edit_at_frame(edit, frame))
+    shown = edit_at_frame(edit, frame)
+    if spec.action_id.startswith("remove.restore"):
+        rows = np.arange(n)
+        shown = replace(shown, removal=shown.removal.with_rows((rows > 1000) & (rows < 1100)))
+    scene.set_edit(shown)
     scene.set_active_handles((edit.handles[0].handle_id,))
     scene.set_pivot(Pivot.ACTIVE if spec.action_id == "handle.pivot_median" else Pivot.MEDIAN)
     scene.set_hidden(np.arange(n) < 20)
