@@ -28,7 +28,7 @@ FIXED_TINTS: Mapping[str, Rgba | None] = {
 """Colour and its share over what cannot move, by name; ``auto`` takes the one that a scene shows best."""
 
 _DARK = 70.0
-"""Mean of the three channels below which half of a scene is too dark to be darkened further."""
+"""Mean of the three channels below which half of a scene is too dark to be darkened: the tint itself has 51."""
 
 
 def fixed_tint(name: str, colors: NDArray[np.uint8]) -> Rgba:
