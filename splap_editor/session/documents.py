@@ -9,7 +9,7 @@ from pathlib import Path
 from splap_editor.core.progress import Progress, no_progress
 from splap_editor.io.session_file import content_hash, read_session_file, write_session_file
 from splap_editor.io.session_specs import SessionFile
-from splap_editor.session.jobs import Job, Post, Worker
+from splap_editor.session.jobs import Job, Post, Starter, Worker
 from splap_editor.session.latest_job import LatestJob
 from splap_editor.session.saved_state import Look, SavedState, restore_scene, saved_state, session_file_of
 from splap_editor.session.scene import Scene
@@ -67,8 +67,9 @@ class _Source:
 class Documents:
     """Opens and saves session files, and knows whether anything would be lost.
 
-    Reading, hashing and writing happen on a worker of its own, so that a
-    save never waits behind a scene that is being prepared.
+    Hashing and writing happen on a worker of its own, so that a save never
+    waits behind a scene that is being prepared; each session file is read at
+    once, whatever becomes of the one before.
 
     Parameters
     ----------
@@ -86,13 +87,16 @@ class Documents:
         self.opened = Signal()
         self.failed = Signal()
         self._session = session
-        self._reading = LatestJob(self.worker, "open", cancels=True)
+        self._openings = Starter(post, name="splap-sessions")
+        self._reading = LatestJob(self._openings, "open", abandons=True)
         self._hashing = LatestJob(self.worker, "hash", cancels=True)
         self._is_written = threading.Event()
         self._is_written.set()
         self._arrival: _Arrival | None = None
         self._source = _Source(Path())
         self._kept: SavedState | None = None
+        # Of files that are asked for one after another the newest is opened, be they PLY or session.
+        session.opening.connect(self._reading.drop)
         SceneFollower(
             session,
             self._on_scene_changed,
@@ -104,6 +108,7 @@ class Documents:
 
     def close(self) -> None:
         """Finish saving and join the worker."""
+        self._openings.close()
         self._is_written.wait(SAVE_TIMEOUT_S)
         self.worker.close()
 
@@ -177,6 +182,7 @@ class Documents:
                 error.open_with = lambda found: self._open(title, read, folder, found)
             self.failed.emit(title, error)
 
+        self._session.stop_opening()
         self._reading.ask(located, done, failed=failed, title=title)
 
     def _on_scene_changed(self) -> None:
@@ -211,7 +217,7 @@ class Documents:
 
         def write(job: Job) -> None:
             try:
-                _take_digest(source)
+                _take_digest(source, job.report)
                 write_session_file(path, session_file_of(state, path.parent, source.digest))
             finally:
                 self._is_written.set()

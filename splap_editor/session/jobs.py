@@ -1,7 +1,8 @@
-"""Worker threads: jobs with progress and cancel, results delivered on the main thread."""
+"""Background threads: jobs with progress and cancel, results delivered on the main thread."""
 
 import threading
 import traceback
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -15,6 +16,8 @@ Post = Callable[[Callable[[], None]], None]
 """Runs a callable on the main thread, soon; called from the worker."""
 
 REPORT_SECONDS = 0.05
+LEAVE_SECONDS = 2.0
+"""How long closing waits for what blocks on a file; it ends with the process."""
 
 
 @dataclass(eq=False)
@@ -41,7 +44,7 @@ class Job:
     share: float = 0.0
     _cancelled: threading.Event = field(default_factory=threading.Event)
     _reported: float = 0.0
-    _worker: "Worker | None" = None
+    _worker: "Threads | None" = None
 
     def cancel(self) -> None:
         """Ask the work to stop at its next report."""
@@ -75,11 +78,11 @@ class Job:
             self._worker.post(lambda: None if self.is_cancelled else call())
 
 
-class Worker:
-    """A single background thread that runs jobs one after another.
+class Threads(ABC):
+    """What runs jobs in the background.
 
     Compiled loops of the engine are serial and let go of Python's lock, so
-    two workers may run side by side. Results, failures and progress reach
+    several threads may run side by side. Results, failures and progress reach
     the main thread through ``post``, in order.
 
     Parameters
@@ -87,56 +90,105 @@ class Worker:
     post : callable
         Runs a callable on the main thread.
     name : str
-        Name of the thread.
+        Name of the threads.
     """
 
-    def __init__(self, post: Post, *, name: str = "splap-worker") -> None:
+    def __init__(self, post: Post, *, name: str) -> None:
         self.post = post
         self.on_progress: Callable[[Job], None] = lambda job: None
         self.on_busy: Callable[[Job | None], None] = lambda job: None
+        self._name = name
+        self._wake = threading.Condition()
+
+    @abstractmethod
+    def submit(self, job: Job) -> Job:
+        """Take a job; where only the newest of its kind matters, a `LatestJob` does that."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Cancel everything and join what runs."""
+
+    @abstractmethod
+    def _jobs(self) -> tuple[Job, ...]:
+        """Jobs that wait or run, the newest last."""
+
+    def cancel(self, *kinds: str) -> None:
+        """Cancel waiting and running jobs of these kinds, or all when none is named."""
+        with self._wake:
+            for job in self._jobs():
+                if not kinds or job.kind in kinds:
+                    job.cancel()
+
+    def is_busy(self, *kinds: str) -> bool:
+        """Whether a job of these kinds (or any) waits or runs and is not cancelled."""
+        with self._wake:
+            return any(not job.is_cancelled and (not kinds or job.kind in kinds) for job in self._jobs())
+
+    def tell_progress(self, job: Job) -> None:
+        """Pass a job's progress to the main thread."""
+        self.post(lambda: None if job.is_cancelled else self.on_progress(job))
+
+    def _run_one(self, job: Job) -> None:
+        try:
+            if job.is_cancelled:
+                raise Cancelled
+            value = job.function(job)
+        except Cancelled:
+            if job.stopped is not None:
+                self.post(job.stopped)
+        except Exception as error:  # a job's failure is shown to the user, whatever it is
+            if not isinstance(error, (ValueError, OSError, MemoryError)):
+                traceback.print_exc()
+            self.post(partial(self._tell_failure, job, error))
+        else:
+            self.post(lambda: self._finish(job, value))
+
+    @staticmethod
+    def _tell_failure(job: Job, error: Exception) -> None:
+        """Tell of a failure, unless nobody wants to know any more what would have come of it."""
+        told = job.stopped if job.is_cancelled else job.failed and partial(job.failed, error)
+        if told is not None:
+            told()
+
+    @staticmethod
+    def _finish(job: Job, value: Any) -> None:
+        if job.is_cancelled:
+            if job.stopped is not None:
+                job.stopped()
+        elif job.done is not None:
+            job.done(value)
+
+
+class Worker(Threads):
+    """A single background thread that runs jobs one after another."""
+
+    def __init__(self, post: Post, *, name: str = "splap-worker") -> None:
+        super().__init__(post, name=name)
         self._queue: deque[Job] = deque()
         self._running: Job | None = None
         self._closing = False
-        self._wake = threading.Condition()
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
     def submit(self, job: Job) -> Job:
-        """Queue a job; where only the newest of its kind matters, a `LatestJob` does that."""
+        """Queue a job."""
         job._worker = self
         with self._wake:
             self._queue.append(job)
             self._wake.notify()
         return job
 
-    def cancel(self, *kinds: str) -> None:
-        """Cancel waiting and running jobs of these kinds, or all when none is named."""
-        with self._wake:
-            for job in (*self._queue, self._running):
-                if job is not None and (not kinds or job.kind in kinds):
-                    job.cancel()
-
-    def is_busy(self, *kinds: str) -> bool:
-        """Whether a job of these kinds (or any) waits or runs and is not cancelled."""
-        with self._wake:
-            return any(
-                job is not None and not job.is_cancelled and (not kinds or job.kind in kinds)
-                for job in (*self._queue, self._running)
-            )
-
-    def tell_progress(self, job: Job) -> None:
-        """Pass a job's progress to the main thread."""
-        self.post(lambda: None if job.is_cancelled else self.on_progress(job))
-
     def close(self, timeout: float = 30.0) -> None:
         """Cancel everything and join the thread."""
         with self._wake:
             self._closing = True
-            for job in (*self._queue, self._running):
-                if job is not None:
-                    job.cancel()
+            for job in self._jobs():
+                job.cancel()
             self._wake.notify()
         self._thread.join(timeout)
+
+    def _jobs(self) -> tuple[Job, ...]:
+        return (*(() if self._running is None else (self._running,)), *self._queue)
 
     def _run(self) -> None:
         while True:
@@ -154,29 +206,62 @@ class Worker:
             if idle:
                 self.post(partial(self._tell_busy, None))
 
-    def _run_one(self, job: Job) -> None:
-        try:
-            if job.is_cancelled:
-                raise Cancelled
-            value = job.function(job)
-        except Cancelled:
-            if job.stopped is not None:
-                self.post(job.stopped)
-        except Exception as error:  # a job's failure is shown to the user, whatever it is
-            if not isinstance(error, (ValueError, OSError, MemoryError)):
-                traceback.print_exc()
-            if job.failed is not None:
-                self.post(partial(job.failed, error))
-        else:
-            self.post(lambda: self._finish(job, value))
-
     def _tell_busy(self, job: Job | None) -> None:
         self.on_busy(job)
 
-    @staticmethod
-    def _finish(job: Job, value: Any) -> None:
-        if job.is_cancelled:
-            if job.stopped is not None:
-                job.stopped()
-        elif job.done is not None:
-            job.done(value)
+
+class Starter(Threads):
+    """A thread of its own for each job, begun at once: no file that is opened waits for one that is slow or blocked.
+
+    A job that is cancelled ends at its next report. Until then it holds on to
+    what it works on, but nobody hears of it any more.
+    """
+
+    def __init__(self, post: Post, *, name: str) -> None:
+        super().__init__(self._post_while_open, name=name)
+        self._post = post
+        self._is_open = True
+        self._running: dict[Job, threading.Thread] = {}
+
+    def submit(self, job: Job) -> Job:
+        """Start a job."""
+        job._worker = self
+        thread = threading.Thread(target=self._run, args=(job,), name=self._name, daemon=True)
+        with self._wake:
+            self._running[job] = thread
+        self._tell_busy()
+        thread.start()
+        return job
+
+    def close(self) -> None:
+        """Cancel everything and join what comes to an end in time; the rest ends with the process, unheard."""
+        self.cancel()
+        end = monotonic() + LEAVE_SECONDS
+        with self._wake:
+            threads = tuple(self._running.values())
+        for thread in threads:
+            thread.join(max(end - monotonic(), 0.0))
+        self._is_open = False
+
+    def _jobs(self) -> tuple[Job, ...]:
+        return tuple(self._running)
+
+    def _run(self, job: Job) -> None:
+        self._run_one(job)
+        with self._wake:
+            del self._running[job]
+        self._tell_busy()
+
+    def _tell_busy(self) -> None:
+        """Tell of the newest job that runs and is wanted, as it is by then."""
+
+        def tell() -> None:
+            with self._wake:
+                wanted = [job for job in self._jobs() if not job.is_cancelled]
+            self.on_busy(wanted[-1] if wanted else None)
+
+        self.post(tell)
+
+    def _post_while_open(self, call: Callable[[], None]) -> None:
+        if self._is_open:
+            self._post(call)

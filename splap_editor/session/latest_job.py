@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-from splap_editor.session.jobs import Job, Worker
+from splap_editor.session.jobs import Job, Threads
 
 Call = Callable[[], None]
 Gate = Callable[[Call], None]
@@ -28,12 +28,14 @@ class LatestJob:
 
     Parameters
     ----------
-    worker : Worker
+    worker : Threads
     kind : str
         Kind of its jobs.
     cancels : bool
         A new request cancels the one that runs, for work that takes long. Without, something is shown while requests
         keep coming, as in a drag.
+    abandons : bool
+        It also begins at once: what runs may be blocked, and its value is not taken. Only for a `Starter`.
     failed : callable, optional
         Given the error of a request that failed.
     freed : callable, optional
@@ -42,10 +44,11 @@ class LatestJob:
 
     def __init__(
         self,
-        worker: Worker,
+        worker: Threads,
         kind: str,
         *,
         cancels: bool = False,
+        abandons: bool = False,
         failed: Callable[[Exception], None] | None = None,
         freed: Call | None = None,
     ) -> None:
@@ -53,6 +56,7 @@ class LatestJob:
         self._worker = worker
         self._kind = kind
         self._cancels = cancels
+        self._abandons = abandons
         self._failed = failed or (lambda error: None)
         self._freed = freed or _nothing
         self._running: Job | None = None
@@ -82,6 +86,8 @@ class LatestJob:
     ) -> None:
         """Run ``function(job)`` on the worker and give its value to ``done``, unless a newer request comes first."""
         self._wanted = wanted
+        if self._abandons:
+            self.drop()
         if self._running is None:
             self._run(function, done, failed or self._failed, title)
             return
@@ -114,7 +120,7 @@ class LatestJob:
         self.forget()
         if self._running is not None:
             self._running.cancel()
-            if self._is_held:
+            if self._is_held or self._abandons:
                 self._running, self._is_held = None, False
 
     def _run(
@@ -125,21 +131,22 @@ class LatestJob:
         title: str,
     ) -> None:
         def made(value: Any) -> None:
-            self._is_held = True
-            self.gate(lambda: taken(value))
+            if self._running is job:
+                self._is_held = True
+                self.gate(lambda: end(_nothing if job.is_cancelled else lambda: done(value)))
 
-        def taken(value: Any) -> None:
-            if self._running is not job:
-                return  # dropped while it was held
-            self._end(_nothing if job.is_cancelled else lambda: done(value))
+        def end(tell: Call) -> None:
+            # It may have been dropped meanwhile, and another run in its place.
+            if self._running is job:
+                self._end(tell)
 
         job = Job(
             self._kind,
             title,
             function,
             made,
-            lambda error: self._end(lambda: failed(error)),
-            lambda: self._end(_nothing),
+            lambda error: end(lambda: failed(error)),
+            lambda: end(_nothing),
         )
         self._running = self._worker.submit(job)
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from splap_editor.io.recipe import read_recipe, write_recipe
 from splap_editor.session.commands import ChangeEdit, ChangeMask, ChangeTogether
 from splap_editor.session.depictor import Depictor, Unseen
 from splap_editor.session.history import History
-from splap_editor.session.jobs import Job, Post, Worker
+from splap_editor.session.jobs import Job, Post, Starter, Threads, Worker
 from splap_editor.session.latest_job import Gate
 from splap_editor.session.scene import Scene
 from splap_editor.session.scene_follower import SceneFollower
@@ -54,14 +55,19 @@ class Session:
         # A turned view must not wait behind a scene being prepared, nor behind quantities, edges and previews.
         self.view_worker = Worker(post, name="splap-view")
         self.detail_worker = Worker(post, name="splap-detail")
-        self.worker.on_progress = lambda job: self.job_changed.emit(job)
-        self.worker.on_busy = self._on_busy
+        # A file that is opened must not wait behind any of them, nor behind another that is slow or blocked.
+        self._openings = Starter(post, name="splap-open")
+        self._busy: dict[Threads, Job | None] = {self._openings: None, self.worker: None}
+        for threads in self._busy:
+            threads.on_progress = lambda job: self.job_changed.emit(job)
+            threads.on_busy = partial(self._on_busy, threads)
         self._told_job: Job | None = None
         self._elsewhere: Job | None = None
         self._ledger = Ledger(cache)
-        self._runner = StageRunner(self._ledger, self.worker)
+        self._runner = StageRunner(self._ledger, self.worker, self._openings)
         self._frames = self._runner.loop("drag")
         self._runner.made.connect(self._on_made)
+        self.opening = Signal()
         self.scene_changed = Signal()
         self.job_changed = Signal()
         self.exported = Signal()
@@ -71,7 +77,7 @@ class Session:
 
     def close(self) -> None:
         """Cancel everything and join the workers."""
-        for worker in (self.worker, self.view_worker, self.detail_worker):
+        for worker in (self._openings, self.worker, self.view_worker, self.detail_worker):
             worker.close()
 
     # ------------------------------------------------------------------ what there is
@@ -123,7 +129,9 @@ class Session:
     # ------------------------------------------------------------------ files
 
     def open(self, path: Path, *, layout: str | None = None, restore: Callable[[Scene], None] | None = None) -> None:
-        """Read a splat PLY in the background; the scene on screen stays until it is read.
+        """Read a splat PLY in the background, at once; the scene on screen stays until it is read.
+
+        A file that is still being read is given up, however long its reader takes to hear of it. `opening` tells.
 
         Parameters
         ----------
@@ -134,7 +142,12 @@ class Session:
             Given the new scene, on the worker, before anyone else knows it: to put a saved edit in place.
         """
         self._ledger.opening = OpenRequest(path, layout, restore, self._ledger.depictor)
+        self.opening.emit()
         self._runner.advance()
+
+    def stop_opening(self) -> None:
+        """Give up the file that is being read, as another is on its way."""
+        self._runner.stop_opening()
 
     def export(self, path: Path, *, as_3dgs: bool = False, columns: tuple[str, ...] = ()) -> None:
         """Write the splats on screen, once they have settled, as a PLY."""
@@ -282,17 +295,24 @@ class Session:
         self._ledger.is_held = False
         self._runner.advance()
 
+    def is_busy(self, *kinds: str) -> bool:
+        """Whether a file is being read, or something made of it, of these kinds or of any."""
+        return any(threads.is_busy(*kinds) for threads in self._busy)
+
     def tell(self, job: Job | None) -> None:
         """Show work that is done elsewhere whenever the worker has none to show; None: it is over."""
         self._elsewhere = job
         if self._told_job is None and self.state != "halted":
             self.job_changed.emit(job)
 
-    def _on_busy(self, job: Job | None) -> None:
+    def _on_busy(self, threads: Threads, job: Job | None) -> None:
         """Tell which job runs; frames of a drag, which have no title, come and go too fast to be told."""
-        if job is not self._told_job and (job is None or job.title):
-            self._told_job = job
-            self.job_changed.emit(job or self._elsewhere)
+        if job is None or job.title:
+            self._busy[threads] = job
+        told = self._busy[self._openings] or self._busy[self.worker]
+        if told is not self._told_job:
+            self._told_job = told
+            self.job_changed.emit(told or self._elsewhere)
 
     def _on_made(self, stage: str, value: Any) -> None:
         if stage == "open":

@@ -3,7 +3,7 @@
 from functools import partial
 from typing import Any
 
-from splap_editor.session.jobs import Worker
+from splap_editor.session.jobs import Starter, Worker
 from splap_editor.session.latest_job import LatestJob
 from splap_editor.session.signals import Signal
 from splap_editor.session.stages import STAGES, Ledger, Stage
@@ -19,15 +19,18 @@ class StageRunner:
     ----------
     ledger : Ledger
     worker : Worker
+    starter : Starter
+        Runs what waits for nothing.
     stages : tuple of Stage
     """
 
-    def __init__(self, ledger: Ledger, worker: Worker, stages: tuple[Stage, ...] = STAGES) -> None:
+    def __init__(self, ledger: Ledger, worker: Worker, starter: Starter, stages: tuple[Stage, ...] = STAGES) -> None:
         self.made = Signal()
         self.failed = Signal()
         self.state_changed = Signal()
         self._ledger = ledger
         self._worker = worker
+        self._starter = starter
         self._stages = stages
         self._loops = {stage.name: self._loop(stage) for stage in stages if stage.make is not None}
 
@@ -66,7 +69,16 @@ class StageRunner:
         for loop in self._loops.values():
             loop.drop()
         self._worker.cancel()
+        self._starter.cancel()
         self._set_state("halted")
+
+    def stop_opening(self) -> None:
+        """Give up the file that is being read, if one is."""
+        if self._ledger.opening is not None:
+            self._ledger.opening = None
+            self._loops["open"].drop()
+            self._set_state("empty" if self._ledger.scene is None else self._ledger.state)
+            self.advance()
 
     @property
     def _is_left(self) -> bool:
@@ -77,7 +89,8 @@ class StageRunner:
     def _loop(self, stage: Stage) -> LatestJob:
         # A stage that awaits itself lets each of its jobs come to an end.
         cancels = stage.name not in stage.awaits
-        return LatestJob(self._worker, stage.name, cancels=cancels, freed=self.advance)
+        threads = self._starter if stage.is_at_once else self._worker
+        return LatestJob(threads, stage.name, cancels=cancels, abandons=stage.is_at_once, freed=self.advance)
 
     def _start(self, stage: Stage, request: Any) -> None:
         self._cancel(stage)

@@ -154,6 +154,8 @@ class Stage:
         ``title(request)``, as shown beside the progress bar and in front of an error.
     is_told : bool
         Shown in the progress bar; frames of a drag come and go too fast for that.
+    is_at_once : bool
+        Runs on a thread of its own, beside the work of all others and beside one of its own kind that is blocked.
     awaits : tuple of str
         Stages whose value is taken first if it is on its way.
     """
@@ -170,6 +172,7 @@ class Stage:
     fail: Callable[[Ledger, Any], None] = lambda ledger, request: None
     title: Callable[[Any], str] = lambda request: ""
     is_told: bool = True
+    is_at_once: bool = False
     awaits: tuple[str, ...] = ()
 
 
@@ -297,6 +300,7 @@ STAGES = (
         take=_take_scene,
         fail=_forget_file,
         title=lambda request: f"Opening {request.path.name}",
+        is_at_once=True,
     ),
     Stage(
         "prepare",

@@ -1,6 +1,7 @@
 """An event loop without a window."""
 
 import queue
+import threading
 import time
 
 
@@ -21,3 +22,12 @@ class MainThread:
             except queue.Empty:
                 raise AssertionError("it did not happen in time") from None
             call()
+
+    def run_to_the_end_of(self, name, seconds=120.0):
+        """Wait for the threads of a name to end, and run all that was posted till then."""
+        for thread in threading.enumerate():
+            if thread.name == name:
+                thread.join(seconds)
+                assert not thread.is_alive()
+        while not self.calls.empty():
+            self.calls.get()()

@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+import threading
 from dataclasses import replace
 
 import numpy as np
@@ -10,10 +11,13 @@ import pytest
 
 from splap_editor.core.handle_nodes import Region
 from splap_editor.core.pose import Pose
+from splap_editor.core.progress import Cancelled
 from splap_editor.engine.keyframes import edit_at_frame, keyed_edit
 from splap_editor.io.session_file import SessionFileError, read_session_file
 from splap_editor.io.session_specs import ViewSpec
+from splap_editor.io.splat_files import read_splats
 from splap_editor.resources import resource
+from splap_editor.session import documents, jobs, work
 from splap_editor.session.commands import ChangeSelectionSets
 from splap_editor.session.documents import Documents, MissingPlyError
 from splap_editor.session.placement import rows_region
@@ -240,3 +244,82 @@ def test_kept_selections_are_undone(desk):
     assert desk.documents.is_dirty
     desk.session.history.undo()
     assert desk.scene.selection_sets == {} and not desk.documents.is_dirty
+
+
+@pytest.fixture
+def door(monkeypatch):
+    """Files whose name begins with "slow" are read once it is opened, and reading them hears nothing till then."""
+    door = Door()
+    monkeypatch.setattr(work, "read_splats", door.guarded(read_splats))
+    monkeypatch.setattr(documents, "read_session_file", door.guarded(read_session_file))
+    yield door
+    door.opened.set()
+
+
+class Door:
+    def __init__(self):
+        self.opened, self.reached = threading.Event(), threading.Event()
+
+    def guarded(self, read):
+        def guarded(path, **options):
+            if path.name.startswith("slow"):
+                self.reached.set()
+                assert self.opened.wait(120.0)
+            return read(path, **{name: value for name, value in options.items() if name != "progress"})
+
+        return guarded
+
+
+@pytest.mark.parametrize("second", ["ply", "session"])
+@pytest.mark.parametrize("first", ["ply", "session", "damaged ply", "damaged session"])
+def test_a_file_opens_while_another_is_blocked_and_what_comes_of_that_is_dropped(desk, tmp_path, door, first, second):
+    desk.open_ply()
+    desk.edit()
+    desk.save(tmp_path / "work.splap")
+    source = desk.ply if "ply" in first else tmp_path / "work.splap"
+    slow = source.with_name(f"slow{source.suffix}")
+    slow.write_bytes(b"ply" if "damaged" in first else source.read_bytes())
+    before = desk.scene
+    (desk.session if "ply" in first else desk.documents).open(slow)
+    assert door.reached.wait(120.0)
+    if second == "ply":
+        desk.open_ply()
+    else:
+        desk.open(tmp_path / "work.splap")
+    shown, path = desk.scene, desk.documents.path
+    assert shown is not before and shown.file.path == desk.ply and (path is None) == (second == "ply")
+    door.opened.set()
+    for name in ("splap-open", "splap-sessions", "splap-open"):
+        desk.main.run_to_the_end_of(name)
+    assert desk.scene is shown and desk.documents.path == path and desk.failures == []
+
+
+def test_closing_does_not_wait_for_a_reader_that_is_blocked(desk, door, monkeypatch):
+    monkeypatch.setattr(jobs, "LEAVE_SECONDS", 0.0)
+    slow = desk.ply.with_name("slow.ply")
+    shutil.copy(desk.ply, slow)
+    desk.session.open(slow)
+    assert door.reached.wait(120.0)
+    while not desk.main.calls.empty():
+        desk.main.calls.get()()
+    desk.close()
+    door.opened.set()
+    desk.main.run_to_the_end_of("splap-open")
+    assert desk.scene is None, "what it read comes to nobody any more"
+
+
+def test_the_hash_made_during_a_save_asks_whether_it_shall_stop(desk, tmp_path, monkeypatch):
+    reports = []
+
+    def unreadable(path, progress):
+        reports.append(progress)
+        raise OSError("no such luck")
+
+    monkeypatch.setattr(documents, "content_hash", unreadable)
+    desk.open_ply()
+    desk.save(tmp_path / "work.splap")
+    job = reports[-1].__self__
+    assert job.kind == "save"
+    job.cancel()
+    with pytest.raises(Cancelled):
+        reports[-1](0.5)

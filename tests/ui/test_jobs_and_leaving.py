@@ -78,7 +78,7 @@ def test_opening_asks_before_an_edit_is_lost(driver, qtbot, choice):
         driver.wait_idle()
     else:
         assert driver.scene is before
-        assert not driver.session.worker.is_busy("open")
+        assert not driver.session.is_busy("open")
 
 
 def test_closing_asks_before_an_edit_is_lost(driver, qtbot):
