@@ -1,20 +1,22 @@
 """The frames of an edit's timeline: posed, and written one file each."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
 from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
 from splap_editor.core.progress import Progress, Runner, in_turn, no_progress, part_of
+from splap_editor.core.splats.splats import Splats
 from splap_editor.core.timeline import LAST_FRAME
-from splap_editor.engine.bound_edit import BoundEdit, bind
+from splap_editor.engine.bound_edit import BoundEdit, bind, written_splats
 from splap_editor.engine.cache import StageCache
 from splap_editor.engine.edit import Edit
 from splap_editor.engine.keyframes import edit_at_frame
 from splap_editor.engine.scripting import write_posed
 from splap_editor.engine.surface import Surface
-from splap_editor.io.splat_files import SplatFile
+from splap_editor.io.formats.table import format_named, format_to_write
+from splap_editor.io.splat_files import SplatFile, write_animation
 
 Pixels = TypeVar("Pixels")
 
@@ -78,7 +80,13 @@ def frame_range(text: str, n_frames: int) -> range:
 
 def frame_path(path: Path, frame: int, last: int) -> Path:
     """``out.ply`` → ``out_0007.ply``, with as many digits as the last frame needs."""
-    return path.with_name(f"{path.stem}_{frame:0{max(4, len(str(last)))}d}{path.suffix}")
+    named = format_named(path)
+    # "out.compressed.ply" has two endings that are one.
+    ending = (
+        next((s for s in named.suffixes if path.name.lower().endswith(s)), "") if named is not None else path.suffix
+    )
+    stem = path.name[: len(path.name) - len(ending)] if ending else path.name
+    return path.with_name(f"{stem}_{frame:0{max(4, len(str(last)))}d}{path.name[len(stem) :]}")
 
 
 def write_frames(
@@ -90,7 +98,7 @@ def write_frames(
     as_3dgs: bool = False,
     progress: Progress = no_progress,
 ) -> list[Path]:
-    """Write a splat file for each frame.
+    """Write a splat file for each frame, or one file of all where its format holds an animation.
 
     Parameters
     ----------
@@ -109,6 +117,9 @@ def write_frames(
     -------
     list of Path
     """
+    if format_to_write(path).writes_frames:
+        _write_animation(poser, file, frames, path, progress)
+        return [path]
     written = []
     for done, kernels in _posed(poser, frames, progress):
         frame = frames[done]
@@ -116,6 +127,15 @@ def write_frames(
         write_posed(written[-1], file, kernels, poser.edit, as_3dgs=as_3dgs)
         progress((done + 1) / len(frames))
     return written
+
+
+def _write_animation(poser: FramePoser, file: SplatFile, frames: range, path: Path, progress: Progress) -> None:
+    def posed() -> Iterator[tuple[int, Splats]]:
+        for done, kernels in _posed(poser, frames, progress):
+            yield frames[done], written_splats(file.splats, kernels, poser.edit)
+            progress((done + 1) / len(frames))
+
+    write_animation(path, file, posed(), poser.edit.timeline.fps, removed=poser.edit.removed)
 
 
 def write_pictures(

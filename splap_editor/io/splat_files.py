@@ -1,7 +1,7 @@
 """Splat files of every format: opened by what they hold, saved by what their name ends in."""
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import BinaryIO
@@ -20,7 +20,15 @@ from splap_editor.io.layout import PlyEvidence
 from splap_editor.io.layouts import LAYOUTS, layout_of
 from splap_editor.io.ply import SplatFile, kept_rows, read_ply, splat_file, write_ply
 
-__all__ = ["FormatError", "SplatFile", "losses_by_format", "losses_of_saving", "read_splats", "write_splats"]
+__all__ = [
+    "FormatError",
+    "SplatFile",
+    "losses_by_format",
+    "losses_of_saving",
+    "read_splats",
+    "write_animation",
+    "write_splats",
+]
 
 
 def read_splats(
@@ -146,6 +154,44 @@ def write_splats(
 
     _write_whole(path, encoded)
     progress(1.0)
+
+
+def write_animation(
+    path: str | os.PathLike[str],
+    file: SplatFile,
+    frames: Iterable[tuple[int, Splats]],
+    rate: float,
+    *,
+    removed: FileMask | None = None,
+) -> None:
+    """Write the frames of an animation to one file, whole or not at all.
+
+    Parameters
+    ----------
+    path : path
+        Its ending must be of a format that holds frames (`SplatFormat.writes_frames`).
+    file : SplatFile
+        What they were read as.
+    frames : iterable of (int, Splats)
+        Numbers and splats, the file's own rows each time.
+    rate : float
+        Frames per second.
+    removed : FileMask, optional
+        As of `write_splats`.
+
+    Raises
+    ------
+    FormatError
+        If the file cannot be written.
+    """
+    row = format_to_write(Path(path))
+    kept = kept_rows(removed, file)
+
+    def bared() -> Iterator[tuple[int, Splats]]:
+        for number, splats in frames:
+            yield number, bare_splats(splats if kept is None else splats.at(kept), row.largest_degree)[0]
+
+    _write_whole(Path(path), lambda out: row.write_frames(out, bared(), rate))
 
 
 def _is_kept(file: SplatFile, row: SplatFormat) -> bool:

@@ -86,3 +86,9 @@ def test_what_is_no_range_is_refused(text):
 def test_names_sort_as_their_frames(tmp_path):
     assert frame_path(tmp_path / "a.b.png", 7, 12).name == "a.b_0007.png"
     assert frame_path(tmp_path / "a.png", 7, 12345).name == "a_00007.png"
+
+
+def test_an_ending_of_two_parts_stays_whole_in_the_names_of_frames():
+    assert frame_path(Path("a/out.compressed.ply"), 7, 30) == Path("a/out_0007.compressed.ply")
+    assert frame_path(Path("out.png"), 7, 30) == Path("out_0007.png")
+    assert frame_path(Path("out"), 7, 30) == Path("out_0007")

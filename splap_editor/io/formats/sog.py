@@ -3,7 +3,6 @@
 import io
 import json
 import math
-import struct
 import zipfile
 from collections.abc import Callable
 from typing import Any, BinaryIO, TypeVar
@@ -22,7 +21,6 @@ from splap_editor.io.splat_cells import blank_table
 
 Result = TypeVar("Result")
 
-MAGIC = b"PK\x03\x04"
 _WIDTHS = {3: 192, 8: 512, 15: 960}
 """Pixels across a palette, 64 entries side by side, by the coefficients of an entry."""
 _LARGEST_META = 1 << 22
@@ -307,11 +305,3 @@ def _webp(pixels: NDArray[np.uint8]) -> bytes:
     # Without "exact", colours under an opacity of zero would be changed.
     Image.fromarray(pixels).save(out, "WEBP", lossless=True, exact=True, quality=75, method=4)
     return out.getvalue()
-
-
-def is_usd_archive(start: bytes) -> bool:
-    """Whether the first member of a zip is a USD layer, as in a ``.usdz``."""
-    if start[:4] != MAGIC or len(start) < 30:
-        return False
-    (length,) = struct.unpack_from("<H", start, 26)
-    return start[30 : 30 + length].lower().endswith((b".usdc", b".usda", b".usd"))

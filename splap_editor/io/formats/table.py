@@ -1,6 +1,6 @@
 """The formats of splat files: a row for each, with what gives it away, what reads and writes it, and what it loses."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -32,6 +32,8 @@ class SplatFormat:
         Whether a file's first `GLANCE` bytes give it away.
     reads, writes : str
         ``"module:function"`` in `splap_editor.io.formats`, imported when it is needed; empty where there is none.
+    writes_frames : str
+        The same for frames of an animation; empty where one file holds one frame.
     rounds : str
         What writing does to the numbers, as a clause; empty where nothing.
     reorders : bool
@@ -52,6 +54,7 @@ class SplatFormat:
     is_begun_by: Callable[[bytes], bool]
     reads: str = ""
     writes: str = ""
+    writes_frames: str = ""
     rounds: str = ""
     reorders: bool = False
     largest_degree: int = 3
@@ -96,6 +99,17 @@ class SplatFormat:
         write: Callable[[BinaryIO, Splats, Progress], None] = _function(self.writes)
         write(out, splats, progress)
 
+    def write_frames(self, out: BinaryIO, frames: Iterable[tuple[int, Splats]], rate: float) -> None:
+        """Encode bare splats at each frame of an animation, ``rate`` frames a second.
+
+        Raises
+        ------
+        FormatError
+            As of `write`.
+        """
+        write: Callable[[BinaryIO, Iterable[tuple[int, Splats]], float], None] = _function(self.writes_frames)
+        write(out, frames, rate)
+
 
 def _function(path: str) -> Callable:
     module, _, name = path.partition(":")
@@ -104,6 +118,16 @@ def _function(path: str) -> Callable:
 
 def _is_sog(start: bytes) -> bool:
     return start[:4] == b"PK\x03\x04"
+
+
+def _is_usd(start: bytes) -> bool:
+    return start.startswith((b"PXR-USDC", b"#usda "))
+
+
+def _is_usdz(start: bytes) -> bool:
+    """Whether the first member of a zip is a USD layer."""
+    length = int.from_bytes(start[26:28], "little")
+    return _is_sog(start) and start[30 : 30 + length].lower().endswith((b".usdc", b".usda", b".usd"))
 
 
 def _is_gltf(start: bytes) -> bool:
@@ -160,6 +184,26 @@ FORMATS: dict[str, SplatFormat] = {
             log_scales=(-10.0, 255 / 16 - 10),
             colors=(-0.5 / 0.15, 0.5 / 0.15),
             readers="Scaniverse, SuperSplat, splat-transform, Spark, Blender add-ons",
+        ),
+        SplatFormat(
+            "usd",
+            "OpenUSD",
+            (".usdc",),
+            _is_usd,
+            reads="usd:read",
+            writes="usd:write_usdc",
+            writes_frames="usd:write_usdc_frames",
+            readers="programs on OpenUSD 26.03 and later",
+        ),
+        SplatFormat(
+            "usdz",
+            "OpenUSD package",
+            (".usdz",),
+            _is_usdz,
+            reads="usd:read",
+            writes="usd:write_usdz",
+            writes_frames="usd:write_usdz_frames",
+            readers="programs on OpenUSD 26.03 and later",
         ),
         SplatFormat(
             "sog",

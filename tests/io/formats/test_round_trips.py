@@ -31,6 +31,7 @@ STEPS = {
         "sh0": 1 / 76.5,
         "shN": 8.5 / 128,
     },
+    ".usdc": {"means": 1e-6, "log_scales": 1e-5, "turn": 1e-3, "alphas": 1e-6, "sh0": 0, "shN": 1e-6},
     ".glb": {"means": 0, "log_scales": 1e-5, "turn": 1e-3, "alphas": 1e-6, "sh0": 0, "shN": 0},
     ".sog": {"means": 1e-4, "log_scales": 0.05, "turn": 0.02, "alphas": 1 / 510, "sh0": 0.05, "shN": 0.5},
     ".compressed.ply": {"means": 2e-3, "log_scales": 5e-3, "turn": 4e-3, "alphas": 1 / 510, "sh0": 0.02, "shN": 1 / 32},

@@ -1,0 +1,203 @@
+"""OpenUSD's ``ParticleField3DGaussianSplat``, still or as an animation; its library, ``usd-core``, is an extra.
+
+A stage's y points up and a PLY's down: the writer turns the prim by half a turn about z, as in a ``.glb``. Reading is
+done by another process: what a damaged file does to a large C++ library stays there.
+"""
+
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from splap_editor.core.progress import Progress
+from splap_editor.core.splats.splats import Splats
+from splap_editor.io.formats.bare_splats import FAINT, OPAQUE, alphas_of
+from splap_editor.io.formats.source import FormatError, Source
+from splap_editor.io.formats.splat32 import log_scales_of
+from splap_editor.io.npz import NpzError, NpzFile
+from splap_editor.io.ply_table import PlyTable
+from splap_editor.io.splat_cells import blank_table
+
+_ROOT, _PRIM = "/World", "/World/Splats"
+_SECONDS = 600.0
+_MOST_BYTES = 1 << 34
+_MISSING = "OpenUSD files need the package usd-core: install it with pip install 'splap-editor[usd]'."
+
+
+def _require_library() -> None:
+    try:
+        import pxr.UsdVol  # noqa: F401
+    except ImportError:
+        raise FormatError(_MISSING) from None
+
+
+def read(source: Source, progress: Progress) -> tuple[PlyTable, list[str]]:
+    """Decode the splats of all prims of a stage, at its first frame.
+
+    Raises
+    ------
+    FormatError
+        If it is damaged or holds no splats, takes too long, or the library is missing.
+    """
+    _require_library()
+    with tempfile.TemporaryDirectory() as folder:
+        held = Path(folder) / "splats.npz"
+        told = _unpacked(source, held, progress)
+        if not held.exists():
+            raise source.refused(*told) if told else source.damaged("its library gave up on it")
+        try:
+            with held.open("rb") as file:
+                archive = NpzFile(file, _MOST_BYTES)
+                arrays = {name: archive.array(name) for name in archive.names}
+        except NpzError as error:
+            raise source.damaged(str(error)) from None
+    means, harmonics = arrays["means"], arrays["harmonics"]
+    n, n_coefficients = len(means), harmonics.shape[1] - 1
+    table, sheet = blank_table(source.name, n, n_coefficients)
+    sheet.means[...] = means
+    sheet.log_scales[...] = log_scales_of(arrays["scales"])
+    sheet.quats[...] = arrays["quats"]
+    alphas = arrays["alphas"].astype(np.float64)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        sheet.logit_opacities[...] = np.clip(np.log(alphas) - np.log1p(-alphas), FAINT, OPAQUE)
+    sheet.sh0[...] = harmonics[:, 0]
+    sheet.shN[...] = harmonics[:, 1:]
+    progress(1.0)
+    return table, ["It is animated: these are the splats of its first frame."] if arrays["is_animated"] else []
+
+
+def _unpacked(source: Source, held: Path, progress: Progress) -> tuple[str, str] | None:
+    """Let another process put the arrays of a stage into an archive; what it says where it does not."""
+    command = [sys.executable, "-m", "splap_editor.io.formats.usd_arrays", str(source.path.resolve()), str(held)]
+    process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+    try:
+        until = time.monotonic() + _SECONDS
+        while True:
+            try:
+                out, _ = process.communicate(timeout=0.1)
+                break
+            except subprocess.TimeoutExpired:
+                progress(0.5)
+            if time.monotonic() > until:
+                raise source.refused("takes too long to read", "Export it again, with fewer splats.")
+    finally:
+        if process.poll() is None:
+            process.kill()
+            process.communicate()
+    what, mark, advice = out.decode("utf-8", "replace").strip().partition("|")
+    return (what, advice) if mark and process.returncode == 2 else None
+
+
+def write_usdc(out: BinaryIO, splats: Splats, progress: Progress) -> None:
+    """Encode bare splats as a ``.usdc``."""
+    _write(out, [(1, splats)], 24.0, is_package=False)
+    progress(1.0)
+
+
+def write_usdz(out: BinaryIO, splats: Splats, progress: Progress) -> None:
+    """Encode bare splats as a ``.usdz``."""
+    _write(out, [(1, splats)], 24.0, is_package=True)
+    progress(1.0)
+
+
+def write_usdc_frames(out: BinaryIO, frames: Iterable[tuple[int, Splats]], rate: float) -> None:
+    """Encode an animation as a ``.usdc``."""
+    _write(out, frames, rate, is_package=False)
+
+
+def write_usdz_frames(out: BinaryIO, frames: Iterable[tuple[int, Splats]], rate: float) -> None:
+    """Encode an animation as a ``.usdz``."""
+    _write(out, frames, rate, is_package=True)
+
+
+def _write(out: BinaryIO, frames: Iterable[tuple[int, Splats]], rate: float, *, is_package: bool) -> None:
+    """Encode bare splats as a stage, time-sampled where there is more than one frame.
+
+    Parameters
+    ----------
+    out : BinaryIO
+    frames : iterable of (frame, Splats)
+        The same splats at each frame; opacities and colours of degree 0 are those of the first.
+    rate : float
+        Frames per second.
+    is_package : bool
+        A ``.usdz``, which wraps a ``.usdc``.
+    """
+    _require_library()
+    from pxr import Sdf, Usd, UsdGeom, UsdUtils
+
+    with tempfile.TemporaryDirectory() as folder:
+        layer = str(Path(folder) / "splats.usdc")
+        stage = Usd.Stage.CreateNew(layer)
+        UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+        stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, _ROOT).GetPrim())
+        prim = stage.DefinePrim(_PRIM, "ParticleField3DGaussianSplat")
+        UsdGeom.Xformable(prim).AddRotateZOp().Set(180.0)
+        stage.SetFramesPerSecond(rate)
+        stage.SetTimeCodesPerSecond(rate)
+        numbers: list[int] = []
+        kept: dict[str, Any] = {}
+        for number, splats in frames:
+            if len(numbers) == 1:
+                # A second frame: what stood for all times was the first.
+                for name, values in kept.items():
+                    attribute = prim.GetAttribute(name)
+                    attribute.Clear()
+                    attribute.Set(values, numbers[0])
+            arrays = _moving(splats)
+            for name, values in arrays.items():
+                prim.GetAttribute(name).Set(values, number) if numbers else prim.GetAttribute(name).Set(values)
+            kept = arrays if not numbers else {}
+            if not numbers:
+                _set_still(prim, splats)
+            numbers.append(number)
+        if len(numbers) > 1:
+            stage.SetStartTimeCode(numbers[0])
+            stage.SetEndTimeCode(numbers[-1])
+        stage.GetRootLayer().Save()
+        if is_package:
+            package = str(Path(folder) / "splats.usdz")
+            UsdUtils.CreateNewUsdzPackage(Sdf.AssetPath(layer), package)
+            layer = package
+        with open(layer, "rb") as file:
+            while chunk := file.read(1 << 20):
+                out.write(chunk)
+
+
+def _moving(splats: Splats) -> dict[str, Any]:
+    """Attributes that change from frame to frame."""
+    from pxr import Vt
+
+    harmonics = np.concatenate([splats.sh0[:, None], splats.shN], axis=1).reshape(-1, 3)
+    found = {
+        "positions": Vt.Vec3fArray.FromNumpy(_floats(splats.means)),
+        "scales": Vt.Vec3fArray.FromNumpy(_floats(np.exp(splats.log_scales))),
+        "orientations": Vt.QuatfArray.FromNumpy(_floats(splats.quats[:, [1, 2, 3, 0]])),
+    }
+    if splats.shN.shape[1]:
+        found["radiance:sphericalHarmonicsCoefficients"] = Vt.Vec3fArray.FromNumpy(_floats(harmonics))
+    return found
+
+
+def _set_still(prim: Any, splats: Splats) -> None:
+    """Set attributes that stay, and those that are wanted of the whole."""
+    from pxr import Vt
+
+    prim.GetAttribute("opacities").Set(Vt.FloatArray.FromNumpy(_floats(alphas_of(splats.logit_opacities))))
+    prim.GetAttribute("radiance:sphericalHarmonicsDegree").Set(splats.sh_degree)
+    if not splats.shN.shape[1]:
+        colors = Vt.Vec3fArray.FromNumpy(_floats(splats.sh0))
+        prim.GetAttribute("radiance:sphericalHarmonicsCoefficients").Set(colors)
+    prim.GetAttribute("sortingModeHint").Set("cameraDistance")
+    reach = 3 * np.exp(splats.log_scales.max(axis=1, keepdims=True))
+    ends = [(splats.means - reach).min(axis=0), (splats.means + reach).max(axis=0)]
+    prim.GetAttribute("extent").Set(Vt.Vec3fArray.FromNumpy(_floats(np.array(ends))))
+
+
+def _floats(values: Any) -> Any:
+    return np.ascontiguousarray(values, np.float32)

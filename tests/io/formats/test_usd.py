@@ -1,0 +1,111 @@
+"""OpenUSD: prims anywhere on a stage, animations in one file, and what is no good."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from pxr import Usd, UsdGeom, Vt
+
+from splap_editor.core.progress import Cancelled
+from splap_editor.io.formats import usd
+from splap_editor.io.formats.source import FormatError
+from splap_editor.io.sample_maker import shape_sample, write_sample
+from splap_editor.io.splat_files import read_splats, write_animation, write_splats
+
+PRIM = "/World/Splats"
+
+
+@pytest.fixture
+def scene(tmp_path):
+    write_sample(tmp_path / "scene.ply", shape_sample("coil", 100).splats)
+    return read_splats(tmp_path / "scene.ply")
+
+
+def moved(file, shift: float):
+    return dataclasses.replace(file.splats, means=file.splats.means + np.float32(shift))
+
+
+@pytest.mark.parametrize("ending", [".usdc", ".usdz"])
+def test_an_animation_is_one_time_sampled_file(tmp_path, scene, ending):
+    path = tmp_path / f"moving{ending}"
+    frames = [(number, moved(scene, number / 10)) for number in (3, 4, 7)]
+    write_animation(path, scene, frames, 30.0)
+    stage = Usd.Stage.Open(str(path))
+    assert stage.GetStartTimeCode() == 3 and stage.GetEndTimeCode() == 7 and stage.GetTimeCodesPerSecond() == 30
+    positions = stage.GetPrimAtPath(PRIM).GetAttribute("positions")
+    assert positions.GetTimeSamples() == [3, 4, 7]
+    for number, splats in frames:
+        np.testing.assert_array_equal(np.array(positions.Get(number)), splats.means)
+    first = read_splats(path)
+    np.testing.assert_allclose(first.splats.means, frames[0][1].means, atol=1e-6)
+    assert any("first frame" in warning for warning in first.warnings)
+
+
+def test_a_still_file_has_no_time_samples(tmp_path, scene):
+    write_splats(tmp_path / "still.usdc", scene, scene.splats)
+    prim = Usd.Stage.Open(str(tmp_path / "still.usdc")).GetPrimAtPath(PRIM)
+    assert all(not attribute.GetTimeSamples() for attribute in prim.GetAttributes())
+    assert read_splats(tmp_path / "still.usdc").warnings == []
+
+
+def changed(tmp_path, scene, change):
+    write_splats(tmp_path / "made.usdc", scene, scene.splats)
+    stage = Usd.Stage.Open(str(tmp_path / "made.usdc"))
+    change(stage, stage.GetPrimAtPath(PRIM))
+    stage.GetRootLayer().Export(str(tmp_path / "changed.usda"))
+    return tmp_path / "changed.usda"
+
+
+def test_a_stage_whose_z_points_up_is_turned(tmp_path, scene):
+    path = changed(tmp_path, scene, lambda stage, prim: UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z))
+    x, y, z = scene.splats.means.T
+    # Half a turn about z puts it on the stage; z up becomes y up, and that half a turn is taken back.
+    np.testing.assert_allclose(read_splats(path).splats.means, np.column_stack([x, -z, y]), atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda stage, prim: stage.RemovePrim(PRIM), "no Gaussian splats"),
+        (lambda stage, prim: prim.GetAttribute("positions").Set(Vt.Vec3fArray(0)), "zero splats"),
+        (lambda stage, prim: UsdGeom.Xformable(prim).AddScaleOp().Set((1, 2, 1)), "stretches"),
+        (lambda stage, prim: prim.GetAttribute("radiance:sphericalHarmonicsDegree").Set(9), "degree 9"),
+    ],
+)
+def test_a_stage_of_no_use_is_refused(tmp_path, scene, change, words):
+    with pytest.raises(FormatError, match=words):
+        read_splats(changed(tmp_path, scene, change))
+
+
+def test_arrays_too_short_count_as_missing(tmp_path, scene):
+    path = changed(tmp_path, scene, lambda stage, prim: prim.GetAttribute("scales").Set(Vt.Vec3fArray(1, (1, 1, 1))))
+    np.testing.assert_allclose(read_splats(path).splats.log_scales, 0, atol=1e-6)
+
+
+def test_damaged_bytes_end_in_a_sentence(tmp_path, scene):
+    write_splats(tmp_path / "good.usdc", scene, scene.splats)
+    data = (tmp_path / "good.usdc").read_bytes()
+    for bad in (data[:200], data[: len(data) // 2], data[:100] + bytes(200) + data[300:]):
+        (tmp_path / "bad.usdc").write_bytes(bad)
+        with pytest.raises(FormatError, match="bad.usdc is damaged|holds no"):
+            read_splats(tmp_path / "bad.usdc")
+
+
+def test_reading_can_be_cancelled(tmp_path, scene):
+    write_splats(tmp_path / "good.usdc", scene, scene.splats)
+
+    def cancel(share: float) -> None:
+        raise Cancelled
+
+    with pytest.raises(Cancelled):
+        read_splats(tmp_path / "good.usdc", progress=cancel)
+
+
+def test_without_the_library_the_line_that_installs_it_is_said(tmp_path, scene, monkeypatch):
+    write_splats(tmp_path / "good.usdc", scene, scene.splats)
+    monkeypatch.setitem(__import__("sys").modules, "pxr.UsdVol", None)
+    with pytest.raises(FormatError, match=r"pip install 'splap-editor\[usd\]'"):
+        read_splats(tmp_path / "good.usdc")
+    with pytest.raises(FormatError, match="usd-core"):
+        write_splats(tmp_path / "out.usdc", scene, scene.splats)
+    assert not (tmp_path / "out.usdc").exists() and usd.__doc__
