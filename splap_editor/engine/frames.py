@@ -81,11 +81,10 @@ def frame_range(text: str, n_frames: int) -> range:
 def frame_path(path: Path, frame: int, last: int) -> Path:
     """``out.ply`` → ``out_0007.ply``, with as many digits as the last frame needs."""
     named = format_named(path)
+    endings = (path.suffix,) if named is None else named.suffixes
     # "out.compressed.ply" has two endings that are one.
-    ending = (
-        next((s for s in named.suffixes if path.name.lower().endswith(s)), "") if named is not None else path.suffix
-    )
-    stem = path.name[: len(path.name) - len(ending)] if ending else path.name
+    ending = next(each for each in endings if path.name.lower().endswith(each.lower()))
+    stem = path.name[: len(path.name) - len(ending)]
     return path.with_name(f"{stem}_{frame:0{max(4, len(str(last)))}d}{path.name[len(stem) :]}")
 
 

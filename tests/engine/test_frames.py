@@ -1,5 +1,7 @@
 """Frames of an edit, one by one."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
