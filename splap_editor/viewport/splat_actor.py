@@ -215,7 +215,8 @@ class SplatActor:
         self._order: RowsByPlace | None = None
         self._build()
         self.shape[:, 1] = glyphs.cutoffs
-        reaches = np.linalg.norm(np.hstack([glyphs.axes_u, glyphs.axes_v]), axis=1) * glyphs.cutoffs
+        squares = sum(np.einsum("ij,ij->i", axes, axes) for axes in (glyphs.axes_u, glyphs.axes_v))
+        reaches = np.sqrt(squares) * glyphs.cutoffs
         self.reach = float(np.median(reaches)) if n else 0.0
         self.set_subject(subject)
         self._room = float(reaches.max(initial=0.0)) + 1e-6 * self.extent

@@ -202,3 +202,11 @@ def test_the_front_of_a_scene_that_stands_along_z_is_seen_along_y():
     np.testing.assert_allclose(scene_axes((0.0, 0.0, 1.0))[1], (0.0, 1.0, 0.0))
     # A capture with Y down was seen along Z by its cameras.
     np.testing.assert_allclose(scene_axes((0.0, -1.0, 0.0))[1], (0.0, 0.0, 1.0))
+
+
+@pytest.mark.parametrize("n", [1, 7])
+def test_framing_leaves_the_points_alone(n):
+    points = np.asfortranarray(np.random.default_rng(0).normal(size=(n, 3)))
+    before = points.copy()
+    framed(VIEW, points, 1.5)
+    np.testing.assert_array_equal(points, before)
