@@ -63,7 +63,8 @@ def deform_frames(options: argparse.Namespace) -> int:
     frames = frame_range(options.frames, held.timeline.n_frames)
     file, poser = _prepared(options, held, report)
     with report("frames"):
-        written = write_frames(poser, file, frames, options.output, as_3dgs=options.as_3dgs, progress=report.progress)
+        as_3dgs, said = options.as_3dgs, report.say
+        written = write_frames(poser, file, frames, options.output, as_3dgs=as_3dgs, say=said, progress=report.progress)
     _tell(options, report, written)
     return 0
 

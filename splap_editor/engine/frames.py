@@ -5,6 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
 from splap_editor.core.progress import Progress, Runner, in_turn, no_progress, part_of
 from splap_editor.core.splats.splats import Splats
@@ -14,6 +17,7 @@ from splap_editor.engine.cache import StageCache
 from splap_editor.engine.edit import Edit
 from splap_editor.engine.keyframes import edit_at_frame
 from splap_editor.engine.scripting import write_posed
+from splap_editor.engine.skin import write_skin
 from splap_editor.engine.surface import Surface
 from splap_editor.io.formats.table import format_named, format_to_write
 from splap_editor.io.splat_files import SplatFile, write_animation
@@ -95,6 +99,7 @@ def write_frames(
     path: Path,
     *,
     as_3dgs: bool = False,
+    say: Callable[[str], None] = lambda text: None,
     progress: Progress = no_progress,
 ) -> list[Path]:
     """Write a splat file for each frame, or one file of all where its format holds an animation.
@@ -109,6 +114,8 @@ def write_frames(
         ``frame_path`` makes the names of it.
     as_3dgs : bool
         Add a thin third scale to a file of two.
+    say : callable
+        Told what a format plays otherwise than the frames are.
     progress : callable
         Asked several times a frame; what is written when it raises stays.
 
@@ -118,6 +125,10 @@ def write_frames(
     """
     if format_to_write(path).writes_frames:
         _write_animation(poser, file, frames, path, progress)
+        return [path]
+    if format_to_write(path).name == "gltf":
+        farthest = _write_skin(poser, file, frames, path, progress)
+        say(f"{path.name} plays by linear blending: centres are off by up to {farthest:.2g} from the frames' own.")
         return [path]
     written = []
     for done, kernels in _posed(poser, frames, progress):
@@ -135,6 +146,14 @@ def _write_animation(poser: FramePoser, file: SplatFile, frames: range, path: Pa
             progress((done + 1) / len(frames))
 
     write_animation(path, file, posed(), poser.edit.timeline.fps, removed=poser.edit.removed)
+
+
+def _write_skin(poser: FramePoser, file: SplatFile, frames: range, path: Path, progress: Progress) -> float:
+    def centers(frame: int) -> NDArray[np.floating] | None:
+        kernels = poser.kernels(frame)
+        return None if kernels is None else kernels.means
+
+    return write_skin(path, file, poser.bound, frames, pose=centers, progress=progress)
 
 
 def write_pictures(

@@ -4,7 +4,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 from numpy.typing import ArrayLike
 
@@ -20,6 +20,9 @@ from splap_editor.io.layout import PlyEvidence
 from splap_editor.io.layouts import LAYOUTS, layout_of
 from splap_editor.io.ply import SplatFile, kept_rows, read_ply, splat_file, write_ply
 
+if TYPE_CHECKING:
+    from splap_editor.io.formats.gltf_skin import Skin
+
 __all__ = [
     "FormatError",
     "SplatFile",
@@ -27,6 +30,7 @@ __all__ = [
     "losses_of_saving",
     "read_splats",
     "write_animation",
+    "write_skinned",
     "write_splats",
 ]
 
@@ -192,6 +196,26 @@ def write_animation(
             yield number, bare_splats(splats if kept is None else splats.at(kept), row.largest_degree)[0]
 
     _write_whole(Path(path), lambda out: row.write_frames(out, bared(), rate))
+
+
+def write_skinned(
+    path: str | os.PathLike[str], file: SplatFile, skin: "Skin", *, removed: FileMask | None = None
+) -> None:
+    """Write a file's splats at rest with an animation's skin as a ``.glb``, whole or not at all.
+
+    Raises
+    ------
+    FormatError
+        If the file cannot be written.
+    """
+    from splap_editor.io.formats.gltf_skin import write
+
+    kept = kept_rows(removed, file)
+    splats = file.splats
+    if kept is not None:
+        splats, skin = splats.at(kept), replace(skin, weights=skin.weights[kept])
+    bare, _ = bare_splats(splats, FORMATS["gltf"].largest_degree)
+    _write_whole(Path(path), lambda out: write(out, bare, skin))
 
 
 def _is_kept(file: SplatFile, row: SplatFormat) -> bool:

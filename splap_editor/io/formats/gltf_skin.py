@@ -1,0 +1,117 @@
+"""An animation as a glTF skin: splats at rest, a weight of each for a few joints, and how the joints move."""
+
+from dataclasses import dataclass
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from splap_editor.core.splats.splats import Splats
+from splap_editor.io.formats.gltf import GlbBuilder, splat_attributes, splat_document
+
+_SMALLEST = 1e-5
+"""Weights below this move nothing that can be seen, and are left out."""
+
+
+@dataclass(frozen=True, eq=False)
+class Skin:
+    """Joints of an animation.
+
+    Parameters
+    ----------
+    names : tuple of str
+        One per joint; after them stands a joint that rests.
+    weights : (N, H) float
+        Of each joint for each splat; rows sum to at most 1, the rest of it is rest.
+    centers : (H, 3) float
+        About which the joints turn and scale.
+    translations, rotations, scales : (F, H, 3), (F, H, 4) and (F, H, 3) float
+        Poses at each frame: scaled along the world axes, turned (w, x, y, z), then moved.
+    seconds : (F,) float
+        When.
+    place : (4, 4) float
+        Where the whole is put, a similarity.
+    """
+
+    names: tuple[str, ...]
+    weights: NDArray[np.floating]
+    centers: NDArray[np.float64]
+    translations: NDArray[np.float64]
+    rotations: NDArray[np.float64]
+    scales: NDArray[np.float64]
+    seconds: NDArray[np.float64]
+    place: NDArray[np.float64]
+
+    def blended(self, means: NDArray[np.floating], frame: int) -> NDArray[np.float64]:
+        """Where a program that plays the skin puts points at rest, before the whole is put in its place."""
+        means = np.asarray(means, np.float64)
+        moved = means * (1 - self.weights.sum(axis=1, keepdims=True))
+        for joint, center in enumerate(self.centers):
+            w, x, y, z = self.rotations[frame, joint]
+            axis, local = np.array([x, y, z]), (means - center) * self.scales[frame, joint]
+            twice = 2 * np.cross(axis, local)
+            turned = local + w * twice + np.cross(axis, twice)
+            moved += self.weights[:, joint, None] * (turned + center + self.translations[frame, joint])
+        return moved
+
+
+def write(out: BinaryIO, splats: Splats, skin: Skin) -> None:
+    """Write bare splats with their skin as a ``.glb``."""
+    builder = GlbBuilder()
+    attributes = splat_attributes(builder, splats)
+    for number, (numbers, weights) in enumerate(_sets(skin.weights)):
+        attributes[f"JOINTS_{number}"] = builder.add(numbers)
+        attributes[f"WEIGHTS_{number}"] = builder.add(weights)
+    document = splat_document(attributes)
+    n_joints = len(skin.names)
+    inverse = np.tile(np.eye(4), (n_joints + 1, 1, 1))
+    inverse[:n_joints, :3, 3] = -skin.centers
+    # Column by column, as glTF has its matrices.
+    bind = builder.add(inverse.transpose(0, 2, 1).reshape(-1, 16).astype("<f4"))
+    first = 2
+    joints = [
+        {"name": name, "translation": center.tolist()} for name, center in zip(skin.names, skin.centers, strict=True)
+    ]
+    turned = document["nodes"][0]["rotation"]
+    place = {"matrix": skin.place.T.ravel().tolist(), "children": [*range(first, first + n_joints + 2)]}
+    mesh = {"mesh": 0, "skin": 0, "name": "splats"}
+    document["nodes"] = [{"rotation": turned, "children": [1]}, place, *joints, {"name": "rest"}, mesh]
+    document["skins"] = [{"joints": [*range(first, first + n_joints + 1)], "inverseBindMatrices": bind, "skeleton": 0}]
+    document["animations"] = [_animation(builder, skin, first)]
+    builder.write(out, document)
+
+
+def _animation(builder: GlbBuilder, skin: Skin, first: int) -> dict[str, Any]:
+    """Channels of all joints, one key a frame."""
+    ends = {"min": [float(skin.seconds.min())], "max": [float(skin.seconds.max())]}
+    times = builder.add(skin.seconds.astype("<f4"), **ends)
+    samplers, channels = [], []
+    for joint in range(len(skin.names)):
+        moved = skin.centers[joint] + skin.translations[:, joint]
+        turns = skin.rotations[:, joint].copy()
+        # The shorter way between neighbours.
+        for frame in range(1, len(turns)):
+            if turns[frame] @ turns[frame - 1] < 0:
+                turns[frame] *= -1
+        paths = {"translation": moved, "rotation": turns[:, [1, 2, 3, 0]], "scale": skin.scales[:, joint]}
+        for path, values in paths.items():
+            samplers.append({"input": times, "output": builder.add(values.astype("<f4")), "interpolation": "LINEAR"})
+            channels.append({"sampler": len(samplers) - 1, "target": {"node": first + joint, "path": path}})
+    return {"name": "timeline", "samplers": samplers, "channels": channels}
+
+
+def _sets(weights: NDArray[np.floating]) -> list[tuple[NDArray[np.uint16], NDArray[np.float32]]]:
+    """Joints and weights in fours, the heaviest first; the resting joint takes what is left of one."""
+    weights = np.where(weights < _SMALLEST, 0, weights)
+    whole = np.column_stack([weights, np.maximum(1 - weights.sum(axis=1), 0)])
+    whole /= whole.sum(axis=1, keepdims=True)
+    n_used = max(int((whole > 0).sum(axis=1).max()), 1)
+    n_sets = -(-n_used // 4)
+    order = np.argsort(-whole, axis=1, kind="stable")[:, : 4 * n_sets]
+    held = np.take_along_axis(whole, order, axis=1)
+    # A joint that weighs nothing must be number 0.
+    order = np.where(held > 0, order, 0)
+    short = 4 * n_sets - order.shape[1]
+    order, held = (np.pad(array, ((0, 0), (0, short))) for array in (order, held))
+    fours = [slice(4 * number, 4 * number + 4) for number in range(n_sets)]
+    return [(order[:, four].astype("<u2"), held[:, four].astype("<f4")) for four in fours]
