@@ -196,7 +196,7 @@ def bench_drag(window, heart: Heart, clock: DrawClock, n_splats: int) -> None:
 
 
 def bare_frames_per_second(window, n_frames: int = 30) -> float:
-    """Frames a second of a loop that marks the geometry changed and draws it, at the thinning of a drag."""
+    """Frames a second of a loop that marks the geometry changed and draws it, in the quality of a drag."""
     viewport = window.view.viewport
     splats = viewport.splats
     actor = splats.deformed
