@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import splap_editor
+from splap_editor.cleaning_cli import add_clean, add_place
 from splap_editor.core.graph.options import EDGE_OPTIONS, GraphOptions
 from splap_editor.core.options import options_of
 from splap_editor.installation import commands as installation
@@ -67,6 +68,15 @@ def _parser() -> argparse.ArgumentParser:
     deform.add_argument("--no-cache", action="store_true", help="neither read nor keep graph and Laplacian")
     _add_output(deform)
     deform.set_defaults(run=_deform)
+
+    for name, text, add in (
+        ("clean", "remove floaters, and what lies outside a box", add_clean),
+        ("place", "level, turn, scale and move a whole scene", add_place),
+    ):
+        command = commands.add_parser(name, help=text)
+        _add_input(command)
+        add(command)
+        _add_output(command)
 
     convert = commands.add_parser("convert", help="write a splat file in another format")
     _add_input(convert)
@@ -285,7 +295,7 @@ def _graph(options: argparse.Namespace) -> int:
     return EXIT_OK
 
 
-_COMMANDS = ("edit", "deform", "convert", "render", "info", "graph", *installation.NAMES)
+_COMMANDS = ("edit", "deform", "convert", "clean", "place", "render", "info", "graph", *installation.NAMES)
 
 
 def _readable(info: dict, indent: str = "") -> str:

@@ -28,6 +28,7 @@ _KIND_OF = {
     "campaign": "pure",
     "test_campaign.py": "pure",
     "test_paper_benchmark.py": "pure",
+    "test_cleaning_cli.py": "pure",
     "test_cli.py": "pure",
     "test_frames_cli.py": "offscreen",
     "test_contributing.py": "pure",

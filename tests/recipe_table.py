@@ -8,6 +8,7 @@ from splap_editor.core.options import Option, ShareOfSize, options_of
 from splap_editor.core.presets import PRESETS
 from splap_editor.core.reach_options import CageOptions
 from splap_editor.io.recipe import recipe_groups
+from splap_editor.io.recipe_removal import PICKED_KINDS
 from tests.keys_table import README, with_block
 
 START, END = "<!-- recipe: python -m tests.recipe_table -->\n", "<!-- end of recipe -->\n"
@@ -28,6 +29,16 @@ def recipe_table() -> str:
         said = f" (`{only[0]}`)" if only else ""
         for name, known in options_of(group).items():
             rows.append((f"{key}.{name}" if key else name, f"{_told(known)}{said}"))
+    kinds = " · ".join(f"`{kind.key}` ({', '.join(f'`{key}`' for key in kind.properties)})" for kind in PICKED_KINDS)
+    rows += [
+        (
+            "remove",
+            "Splats left out of everything, first of all and in the file's coordinates: an object, or a list of them "
+            f"taken in order. Each has one of `rows` · {kinds}; `outside`: all others are meant; `restore`: they come "
+            "back",
+        ),
+        ("place", "`center`, `translate`, `rotate` (w, x, y, z), `scale`: all of it as one body, last of all"),
+    ]
     return "\n".join(["| key | meaning |", "|---|---|", *(f"| `{key}` | {told} |" for key, told in rows)]) + "\n"
 
 

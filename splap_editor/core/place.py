@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from splap_editor.core.pose import LARGEST_COORDINATE, SCALES
 from splap_editor.core.splats.rotations import matrices_to_quats, quat_products, quats_to_matrices
-from splap_editor.core.splats.spherical_harmonics import rotated_sh
 from splap_editor.core.splats.splats import Splats
 
 
@@ -109,7 +108,95 @@ def placed_splats(splats: Splats, place: Place) -> Splats:
         n = splats.n_splats
         shN = splats.shN
         if shN.shape[1]:
+            # It brings the compiler with it, which who only reads a recipe shall not wait for.
+            from splap_editor.core.splats.spherical_harmonics import rotated_sh
+
             rotations = np.broadcast_to(place.rotation, (n, 3, 3))
             shN = rotated_sh(shN, rotations, np.ones(n, bool)).astype(shN.dtype, copy=False)
         changed = replace(changed, quats=quats.astype(splats.quats.dtype), shN=shN)
     return changed
+
+
+def fitted_plane(points: NDArray[np.floating]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Middle (3,) of points (n, 3) and unit normal (3,) of the plane that lies closest to them; its side means nothing.
+
+    Raises
+    ------
+    ValueError
+        The points are fewer than three, or lie on a line.
+    """
+    points = np.asarray(points, np.float64)
+    middle = points.mean(axis=0) if len(points) else np.zeros(3)
+    if len(points) >= 3:
+        _, lengths, axes = np.linalg.svd(points - middle, full_matrices=False)
+        if lengths[1] > 1e-9 * lengths[0]:
+            return middle, axes[2]
+    raise ValueError("a plane needs three points that do not lie on a line: choose others")
+
+
+def levelled(place: Place, floor: NDArray[np.floating], up: NDArray[np.floating], above: NDArray[np.floating]) -> Place:
+    """Turn a place by as little as makes a floor level, about its middle.
+
+    Parameters
+    ----------
+    place : Place
+    floor : (n, 3) float
+        Points of the floor, in the file's coordinates; three or more.
+    up : (3,) float
+        Where up is in what is written, of any length but zero.
+    above : (3,) float
+        A point over the floor, such as the middle of the subject, in the file's coordinates.
+
+    Raises
+    ------
+    ValueError
+        The points lie on a line.
+    """
+    middle, normal = fitted_plane(placed_points(floor, place))
+    upward = np.asarray(up, np.float64) / np.linalg.norm(up)
+    if normal @ (placed_points(np.asarray(above)[None], place)[0] - middle) < 0.0:
+        normal = -normal
+    return place.followed_by(about(middle, turn=_turn_between(normal, upward)))
+
+
+def _turn_between(a: NDArray[np.float64], b: NDArray[np.float64]) -> tuple[float, float, float, float]:
+    """Unit quaternion of the smallest turn from one unit vector to another; half a turn about any axis across them."""
+    if a @ b < -1.0 + 1e-12:
+        across = np.cross(a, np.eye(3)[np.argmin(np.abs(a))])
+        quat = np.concatenate([[0.0], across])
+    else:
+        quat = np.concatenate([[1.0 + a @ b], np.cross(a, b)])
+    w, x, y, z = (quat / np.linalg.norm(quat)).tolist()
+    return w, x, y, z
+
+
+def sized(place: Place, a: NDArray[np.floating], b: NDArray[np.floating], length: float) -> Place:
+    """Scale a place about the first of two points (3,), in the file's coordinates, so that they are ``length`` apart.
+
+    Raises
+    ------
+    ValueError
+        The points coincide, the length is not positive, or the scale would leave the limits of a place.
+    """
+    ends = placed_points(np.array([a, b]), place)
+    apart = float(np.linalg.norm(ends[1] - ends[0]))
+    if not (apart > 0.0 and 0.0 < length < np.inf):
+        raise ValueError("a true size needs two points apart from each other and a length above 0")
+    if not SCALES[0] <= place.scale * length / apart <= SCALES[1]:
+        raise ValueError(f"a length of {length:g} would scale the scene beyond {SCALES[0]:g} to {SCALES[1]:g} times")
+    return place.followed_by(about(ends[0], scale=length / apart))
+
+
+def recentred(place: Place, center: NDArray[np.floating]) -> Place:
+    """Move a place so that a point (3,) of the file, such as the middle of the subject, is written at the origin."""
+    delta = np.eye(4)
+    delta[:3, 3] = -placed_points(np.asarray(center)[None], place)[0]
+    return place.followed_by(delta)
+
+
+def about(
+    center: NDArray[np.float64], *, turn: tuple[float, float, float, float] = Place.rotate, scale: float = 1.0
+) -> NDArray[np.float64]:
+    """(4, 4) turn and scale about a point."""
+    x, y, z = np.asarray(center, np.float64).tolist()
+    return Place((x, y, z), rotate=turn, scale=scale).matrix

@@ -74,7 +74,14 @@ class PickedRange:
     most: float = np.inf
 
 
-Picked = PickedRows | PickedBox | PickedBall | PickedSide | PickedRange
+@dataclass(frozen=True)
+class PickedFloaters:
+    """What floats about the subject, see `splap_editor.core.splats.floaters`; 0 takes nothing."""
+
+    strength: float = 0.5
+
+
+Picked = PickedRows | PickedBox | PickedBall | PickedSide | PickedRange | PickedFloaters
 
 
 @dataclass(frozen=True)
@@ -96,7 +103,7 @@ class RemovalStep:
 
 
 Finder = Callable[[Picked, FileMask], FileMask]
-"""``find(picked, removed)``: (N,) splats of a range, those already removed left out of account."""
+"""``find(picked, removed)``: (N,) splats of a range or of floaters, those already removed left out of account."""
 
 
 def removed_splats(steps: Iterable[RemovalStep], means: NDArray[np.floating], find: Finder | None = None) -> FileMask:
@@ -108,7 +115,7 @@ def removed_splats(steps: Iterable[RemovalStep], means: NDArray[np.floating], fi
     means : (N, 3) float
         Centres in the file's units.
     find : callable, optional
-        Needed for ranges.
+        Needed for ranges and floaters.
 
     Returns
     -------
@@ -131,7 +138,7 @@ def after_step(
 ) -> FileMask:
     """(N,) what is removed once a further step is taken; see `removed_splats`."""
     picked = step.picked
-    if isinstance(picked, PickedRange):
+    if isinstance(picked, PickedRange | PickedFloaters):
         assert find is not None
         inside = find(picked, removed)
     else:

@@ -10,6 +10,7 @@ import numpy as np
 from splap_editor.core.index_spaces import FileMask
 from splap_editor.core.removal import (
     Picked,
+    PickedFloaters,
     PickedRange,
     RemovalStep,
     after_step,
@@ -90,7 +91,7 @@ def removal_of(steps: Iterable[RemovalStep], splats: Splats) -> Removal:
 
 
 class Finder:
-    """Picks splats by a quantity: what needs more than centres.
+    """Picks splats by a quantity or as floaters: what needs more than centres.
 
     Parameters
     ----------
@@ -103,6 +104,10 @@ class Finder:
 
     def __call__(self, picked: Picked, removed: FileMask) -> FileMask:
         """(N,) which of the splats that are left are picked."""
+        if isinstance(picked, PickedFloaters):
+            from splap_editor.engine.floaters import floating_rows
+
+            return floating_rows(self._splats, removed, picked.strength)
         assert isinstance(picked, PickedRange)
         values = rest_values(picked.quantity, self._splats, removed)
         with np.errstate(invalid="ignore"):

@@ -14,6 +14,7 @@ from splap_editor.core.removal import (
     Picked,
     PickedBall,
     PickedBox,
+    PickedFloaters,
     PickedRange,
     PickedRows,
     PickedSide,
@@ -92,6 +93,10 @@ def _range(within: JsonObject) -> PickedRange:
     return PickedRange(name, least, most)
 
 
+def _floaters(found: JsonObject) -> PickedFloaters:
+    return PickedFloaters(found.number("strength", PickedFloaters.strength, above=0.0, least=True, most=0.99))
+
+
 def _ball(ball: JsonObject) -> PickedBall:
     radius = ball.number("radius", above=0.0, most=LARGEST_SIZE)
     return PickedBall(ball.vector("center", 3, most=LARGEST_COORDINATE), radius)
@@ -143,6 +148,15 @@ PICKED_KINDS = (
         _range,
         _said_range,
         "Splats for which a quantity is within bounds, both included.",
+    ),
+    PickedKind(
+        "floaters",
+        PickedFloaters,
+        {"strength": {"type": "number", "minimum": 0, "maximum": 0.99, "default": PickedFloaters.strength}},
+        (),
+        _floaters,
+        lambda found: {"strength": found.strength},
+        "Splats that float about the subject: haze, clumps and far specks.",
     ),
 )
 """Ways of picking splats beside by row; each replays on a capture that was trained anew."""

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from splap_editor.core.place import Place, placed_points, placed_splats
+from splap_editor.core.place import Place, fitted_plane, levelled, placed_points, placed_splats, recentred, sized
 from splap_editor.core.splats.rotations import quats_to_matrices
 from splap_editor.core.splats.spherical_harmonics import view_colors
 from splap_editor.core.splats.splats import Splats
@@ -66,3 +66,28 @@ def test_a_place_goes_on_by_a_further_similarity():
 def test_the_filter_grows_with_the_scene():
     rest = replace(splats(), filter_radii=np.full(40, 0.01))
     np.testing.assert_allclose(placed_splats(rest, PLACE).scales, 2.5 * rest.scales)
+
+
+def test_a_floor_is_level_whatever_side_its_normal_points_to():
+    rng = np.random.default_rng(2)
+    M = PLACE.matrix
+    floor = np.column_stack([rng.normal(size=(30, 2)), np.zeros(30)])
+    for side in (1.0, -1.0):
+        tilted, above = floor @ M[:3, :3].T + M[:3, 3], M[:3, :3] @ [0.0, 0.0, side] + M[:3, 3]
+        place = levelled(Place(), tilted, np.array([0.0, 0.0, 2.0]), above)
+        down = placed_points(tilted, place)
+        assert np.ptp(down[:, 2]) < 1e-9
+        assert placed_points(above[None], place)[0, 2] > down[0, 2]
+
+
+def test_a_measured_length_and_a_centre_come_out_as_asked():
+    a, b = np.array([0.1, 0.2, 0.3]), np.array([1.0, -1.0, 0.5])
+    place = recentred(sized(PLACE, a, b, 0.25), a)
+    ends = placed_points(np.array([a, b]), place)
+    assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(0.25)
+    np.testing.assert_allclose(ends[0], 0.0, atol=1e-12)
+
+
+def test_points_on_a_line_are_no_floor():
+    with pytest.raises(ValueError, match="do not lie on a line"):
+        fitted_plane(np.outer(np.arange(4.0), [1.0, 2.0, 3.0]))

@@ -151,6 +151,7 @@ def test_a_removal_that_does_not_fit_is_refused(file, remove, message):
         ({"remove": {"box": {"center": [0, 0, 0], "size": [1, 0, 1]}}}, "remove.box.size must be three numbers"),
         ({"remove": {"plane": {"point": [0, 0, 0], "normal": [0, 0, 0]}}}, "remove.plane.normal must be a vector"),
         ({"remove": {"quantity": {"name": "alpha", "least": 2, "most": 1}}}, "remove.quantity.most must be at least 2"),
+        ({"remove": {"floaters": {"strength": 2}}}, "remove.floaters.strength must be"),
         ({"place": {"scale": 0}}, "place.scale must be"),
         ({"place": {"rotate": [0, 0, 0, 0]}}, "place.rotate must be a quaternion"),
     ],

@@ -1,0 +1,76 @@
+"""Laws of the floater finder, and what it finds in a scene whose floaters are known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from splap_editor.core.graph.options import GraphOptions
+from splap_editor.core.graph.splat_graph import splat_graph
+from splap_editor.core.place import Place, placed_splats
+from splap_editor.core.splats.contributions import contributions
+from splap_editor.core.splats.floaters import floaters
+from splap_editor.core.splats.occupancy import occupancy_ellipses
+from splap_editor.core.splats.splats import Splats
+from splap_editor.io.ply import read_ply
+from splap_editor.resources import resource
+from tests.benchmark.floaters import with_floaters
+
+PLACE = Place(rotate=(0.8, 0.0, 0.6, 0.0), translate=(1.0, 2.0, 3.0), scale=2.0)
+
+
+def likelihoods(splats):
+    """(N,) of every file row, 0 for inert ones."""
+    ellipses = occupancy_ellipses(splats)
+    graph = splat_graph(ellipses, GraphOptions())
+    made = floaters(splats, ellipses, graph.matrix(), contributions(splats, ellipses))
+    held = np.zeros(splats.n_splats)
+    held[ellipses.rows] = made.likelihoods
+    return held, made, ellipses
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return with_floaters(read_ply(resource("samples", "tube.ply")).splats, seed=7)
+
+
+def test_known_floaters_are_found_and_little_else(scene):
+    splats, is_floater = scene
+    found = likelihoods(splats)[0] > 0.5
+    hits = (found & is_floater).sum()
+    assert hits >= 0.95 * is_floater.sum()
+    assert hits >= 0.95 * found.sum()
+
+
+def test_a_higher_strength_takes_what_a_lower_one_takes(scene):
+    made = likelihoods(scene[0])[1]
+    assert not made.at(0.0).any()
+    for low, high in ((0.2, 0.5), (0.5, 0.9)):
+        assert not (made.at(low) & ~made.at(high)).any()
+
+
+def test_order_and_place_do_not_matter(scene):
+    splats, _ = scene
+    found = likelihoods(splats)[0] > 0.5
+    order = np.random.default_rng(0).permutation(splats.n_splats)
+    shuffled = replace(splats, **{name: np.asarray(getattr(splats, name))[order] for name in _parts(splats)})
+    # Pixels at the rims of splats move with the frame, which a few doubtful ones feel.
+    assert (found[order] != (likelihoods(shuffled)[0] > 0.5)).mean() < 0.005
+    placed = placed_splats(replace(splats, means=np.asarray(splats.means, np.float64)), PLACE)
+    assert (found != (likelihoods(placed)[0] > 0.5)).mean() < 0.005
+
+
+def _parts(splats):
+    """Names of its arrays."""
+    held = vars(splats)
+    return [name for name in Splats.__dataclass_fields__ if isinstance(held[name], np.ndarray)]
+
+
+def test_a_scene_of_one_splat_has_no_floater():
+    splats = read_ply(resource("samples", "tube.ply")).splats
+    ellipses = occupancy_ellipses(splats)
+    removed = np.ones(splats.n_splats, bool)
+    removed[ellipses.rows[0]] = False
+    one = occupancy_ellipses(splats, removed=removed)
+    graph = splat_graph(one, GraphOptions())
+    assert len(floaters(splats, one, graph.matrix(), contributions(splats, one)).at(0.5)) == 1
