@@ -16,6 +16,8 @@ from splap_editor.stage_report import ShareLine, StageReport
 
 EXIT_OK, EXIT_REFUSED = 0, 2
 
+_PICTURES = "a .png, a folder, or of several pictures a .mp4, .webm, .gif or .apng"
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run ``splap-editor``.
@@ -88,9 +90,12 @@ def _parser() -> argparse.ArgumentParser:
     render = commands.add_parser("render", help="draw a picture, the frames of an animation, or a turn all round")
     _add_input(render)
     _add_edit(render, required=False)
-    render.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.png", help="or a folder")
+    render.add_argument(
+        "-o", "--output", required=True, type=Path, metavar="OUT.png", help="or a folder, .mp4, .webm, .gif or .apng"
+    )
     _add_frames(render, "draw a picture for each frame of a session's timeline")
     render.add_argument("--turntable", type=int, metavar="N", help="draw N pictures all round")
+    render.add_argument("--fps", type=float, metavar="N", help="of a video; default the session's, or 24")
     render.add_argument("--size", type=_size, default=(1280, 720), metavar="WxH", help="in pixels; default 1280x720")
     render.add_argument("--mode", choices=("splats", "ellipses", "points"), help="how; default splats")
     render.add_argument("--transparent", action="store_true", help="no background")

@@ -2,7 +2,7 @@
 
 import argparse
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +11,7 @@ from splap_editor.io.png import write_png
 from splap_editor.io.recipe import read_recipe
 from splap_editor.io.session_file import content_hash, read_session_file
 from splap_editor.io.session_specs import SessionFile
+from splap_editor.io.video import is_video, write_video
 from splap_editor.stage_report import StageReport
 
 if TYPE_CHECKING:
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
+    from splap_editor.core.timeline import Timeline
     from splap_editor.engine.edit import Edit
     from splap_editor.engine.frames import FramePoser
     from splap_editor.io.splat_files import SplatFile
@@ -71,7 +73,7 @@ def deform_frames(options: argparse.Namespace) -> int:
 
 def render(options: argparse.Namespace) -> int:
     """Draw a picture, one for each frame, or one for each step of a turntable."""
-    from splap_editor.engine.frames import frame_range, write_pictures
+    from splap_editor.engine.frames import drawn_frames, frame_range, write_pictures
     from splap_editor.viewport.studio import turntable_views
 
     if options.turntable is not None and not 1 <= options.turntable <= LARGEST_TURNTABLE:
@@ -87,8 +89,11 @@ def render(options: argparse.Namespace) -> int:
             raise ValueError("--frames needs keyframes: give a session saved by the editor with --session")
         frames = frame_range(options.frames, timeline.n_frames)
     file, poser = _prepared(options, held, report)
-    output = options.output
-    if output.is_dir() or output.suffix.lower() != ".png":
+    output, rate = options.output, _rate(options, timeline)
+    makes_video = is_video(output)
+    if makes_video and frames is None and options.turntable is None:
+        raise ValueError(f"{output.name} is a video, which needs --frames or --turntable")
+    if not makes_video and (output.is_dir() or output.suffix.lower() != ".png"):
         output.mkdir(parents=True, exist_ok=True)
         output = output / f"{file.path.stem}.png"
     with report("scene"):
@@ -100,7 +105,10 @@ def render(options: argparse.Namespace) -> int:
             return studio.picture(view, is_transparent=options.transparent)
 
         with report("pictures"):
-            if frames is not None:
+            if frames is not None and makes_video:
+                write_video(output, drawn_frames(poser, frames, draw, progress=report.progress), rate)
+                written = [output]
+            elif frames is not None:
                 written = write_pictures(poser, frames, output, draw, write_png, progress=report.progress)
             elif options.turntable is None:
                 write_png(output, draw(poser.kernels(None)))
@@ -108,7 +116,8 @@ def render(options: argparse.Namespace) -> int:
             else:
                 studio.pose(poser.kernels(None))
                 views = turntable_views(view, options.turntable, studio.viewport.camera.world_up)
-                written = _drawn_round(studio, views, output, options.transparent, report)
+                pictures = _drawn_round(studio, views, options.transparent, report)
+                written = _written_round(pictures, output, len(views), rate)
     finally:
         studio.close()
     _tell(options, report, written)
@@ -168,16 +177,33 @@ def _studio(
     return studio, View(eye, focus, up, spec.angle, spec.is_parallel)
 
 
+def _rate(options: argparse.Namespace, timeline: "Timeline | None") -> float:
+    """Pictures per second of a video."""
+    if options.fps is None:
+        return 24.0 if timeline is None else timeline.fps
+    if not 0 < options.fps <= 1000:
+        raise ValueError(f"--fps must be above 0 and up to 1000, got {options.fps:g}")
+    return float(options.fps)
+
+
 def _drawn_round(
-    studio: "Studio", views: "list[View]", output: Path, is_transparent: bool, report: StageReport
-) -> list[Path]:
+    studio: "Studio", views: "list[View]", is_transparent: bool, report: StageReport
+) -> "Iterator[NDArray[np.uint8]]":
+    for number, view in enumerate(views, start=1):
+        yield studio.picture(view, is_transparent=is_transparent)
+        report.progress(number / len(views))
+
+
+def _written_round(pictures: "Iterator[NDArray[np.uint8]]", output: Path, n: int, rate: float) -> list[Path]:
+    """Write the pictures of a turntable, as a video or one file each."""
     from splap_editor.engine.frames import frame_path
 
-    written = []
-    for number, view in enumerate(views, start=1):
-        written.append(frame_path(output, number, len(views)))
-        write_png(written[-1], studio.picture(view, is_transparent=is_transparent))
-        report.progress(number / len(views))
+    if is_video(output):
+        write_video(output, pictures, rate)
+        return [output]
+    written = [frame_path(output, number, n) for number in range(1, n + 1)]
+    for path, picture in zip(written, pictures, strict=True):
+        write_png(path, picture)
     return written
 
 

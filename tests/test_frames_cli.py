@@ -144,3 +144,17 @@ def test_a_session_of_another_file_is_noted(tmp_path, ply, session, capsys):
     write_session_file(path, replace(held, ply=PlySpec("tube.ply", "blake2b:00", held.ply.n_splats)))
     assert main(["deform", str(ply), "--session", str(path), "-o", str(tmp_path / "out.ply")]) == 0
     assert "not the file that the session was saved with" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("ending", [".gif", ".mp4"])
+def test_a_turntable_is_one_video(ending, tmp_path, capsys):
+    out = tmp_path / f"out{ending}"
+    arguments = ["--turntable", "4", "--size", "64x48", "--fps", "12", "--json"]
+    assert main(["render", str(TUBE), "-o", str(out), *arguments]) == 0
+    assert json.loads(capsys.readouterr().out)["outputs"] == [str(out)]
+    assert out.stat().st_size > 500 and list(tmp_path.iterdir()) == [out]
+
+
+def test_a_video_of_one_picture_is_refused(tmp_path, capsys):
+    assert main(["render", str(TUBE), "-o", str(tmp_path / "out.mp4")]) == 2
+    assert "needs --frames or --turntable" in capsys.readouterr().err

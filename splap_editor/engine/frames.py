@@ -156,6 +156,19 @@ def _write_skin(poser: FramePoser, file: SplatFile, frames: range, path: Path, p
     return write_skin(path, file, poser.bound, frames, pose=centers, progress=progress)
 
 
+def drawn_frames(
+    poser: FramePoser,
+    frames: range,
+    draw: Callable[[AdaptedKernels | None], Pixels],
+    *,
+    progress: Progress = no_progress,
+) -> Iterator[Pixels]:
+    """Draw each frame, one at a time; parameters as of `write_pictures`."""
+    for done, kernels in _posed(poser, frames, progress):
+        yield draw(kernels)
+        progress((done + 1) / len(frames))
+
+
 def write_pictures(
     poser: FramePoser,
     frames: range,
@@ -177,10 +190,9 @@ def write_pictures(
         ``write(path, pixels)``.
     """
     written = []
-    for done, kernels in _posed(poser, frames, progress):
-        written.append(frame_path(path, frames[done], frames[-1]))
-        write(written[-1], draw(kernels))
-        progress((done + 1) / len(frames))
+    for frame, picture in zip(frames, drawn_frames(poser, frames, draw, progress=progress), strict=True):
+        written.append(frame_path(path, frame, frames[-1]))
+        write(written[-1], picture)
     return written
 
 

@@ -18,6 +18,8 @@ from PySide6.QtWidgets import (
 )
 
 from splap_editor.core.timeline import LAST_FRAME, Timeline
+from splap_editor.io.splat_files import name_filter
+from splap_editor.io.video import VIDEOS
 from splap_editor.ui.actions.file_actions import folder_to_write
 from splap_editor.ui.theme import STEP
 from splap_editor.ui.timeline.frame_export import FrameOrder
@@ -28,6 +30,9 @@ from splap_editor.viewport.screenshot import LARGEST_PX
 
 KINDS = {"ply": "A PLY for each frame", "pictures": "A picture of each frame", "turntable": "Pictures all round"}
 N_ROUND = 72
+
+_SPLATS = f"Splats ({name_filter(to_write=True)})"
+_PICTURES = f"PNG pictures or a video (*.png {' '.join(f'*{ending}' for ending in VIDEOS)})"
 
 
 class FramesDialog(QDialog):
@@ -118,7 +123,7 @@ class FramesDialog(QDialog):
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         # Each frame gets a number of its own: the name itself is never written.
         dialog.setOption(QFileDialog.Option.DontConfirmOverwrite)
-        dialog.setNameFilter("Splat PLY (*.ply)" if suffix == "ply" else "PNG picture (*.png)")
+        dialog.setNameFilter(_SPLATS if suffix == "ply" else _PICTURES)
         dialog.setDefaultSuffix(suffix)
         dialog.fileSelected.connect(lambda name: self.export_to(Path(name)))
         dialog.open()

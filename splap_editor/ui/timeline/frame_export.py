@@ -1,7 +1,7 @@
 """Frames as files: posed on the worker, drawn on the main thread between its events."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
 from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.edit import binds_like
-from splap_editor.engine.frames import FramePoser, frame_path, frame_poser, write_frames, write_pictures
+from splap_editor.engine.frames import FramePoser, drawn_frames, frame_path, frame_poser, write_frames, write_pictures
 from splap_editor.io.png import write_png
+from splap_editor.io.video import is_video, write_video
 from splap_editor.session.jobs import Job
 from splap_editor.session.scene import Scene
 from splap_editor.session.session import Session
@@ -90,14 +91,25 @@ def submit_frames(
         progress = job.progress("frames")
         if desk is None:
             return write_frames(poses, file, frames, path, as_3dgs=order.as_3dgs, progress=progress)
+        if order.kind == "pictures" and is_video(path):
+            drawn = drawn_frames(poses, frames, lambda k: desk.picture(job, k), progress=progress)
+            write_video(path, drawn, edit.timeline.fps)
+            return [path]
         if order.kind == "pictures":
             return write_pictures(poses, frames, path, lambda k: desk.picture(job, k), write_png, progress=progress)
         kernels = poses.kernels(None)
-        written = []
-        for number, view in enumerate(turntable_views(desk.view, len(frames), desk.world_up), start=1):
-            written.append(frame_path(path, number, len(frames)))
-            write_png(written[-1], desk.picture(job, kernels, view))
-            progress(number / len(frames))
+
+        def turned() -> Iterator[NDArray[np.uint8]]:
+            for number, view in enumerate(turntable_views(desk.view, len(frames), desk.world_up), start=1):
+                yield desk.picture(job, kernels, view)
+                progress(number / len(frames))
+
+        if is_video(path):
+            write_video(path, turned(), edit.timeline.fps)
+            return [path]
+        written = [frame_path(path, number, len(frames)) for number in range(1, len(frames) + 1)]
+        for each, picture in zip(written, turned(), strict=True):
+            write_png(each, picture)
         return written
 
     def ended(call: Callable[[], None]) -> None:
