@@ -102,6 +102,8 @@ class RemovalStep:
     restores: bool = False
 
 
+_BLOCK_ROWS = 1 << 14
+
 Finder = Callable[[Picked, FileMask], FileMask]
 """``find(picked, removed)``: (N,) splats of a range or of floaters, those already removed left out of account."""
 
@@ -165,29 +167,26 @@ def picked_splats(picked: PickedRows | PickedBox | PickedBall | PickedSide, mean
             )
         found[picked.rows] = True
         return found
-    if isinstance(picked, PickedSide):
-        normal = np.asarray(picked.normal, np.float64)
-        normal = normal / np.abs(normal).max()
-        return _along(means, normal) > normal @ np.asarray(picked.point)
-    center = np.asarray(picked.center, np.float64)
-    if isinstance(picked, PickedBall):
-        squares = np.zeros(len(means))
-        for axis in range(3):
-            squares += (np.asarray(means[:, axis], np.float64) - center[axis]) ** 2
-        return squares <= picked.radius**2
-    found = np.ones(len(means), bool)
-    for axis, length in zip(quats_to_matrices(np.array([picked.rotate]))[0].T, picked.size, strict=True):
-        found &= np.abs(_along(means, axis) - center @ axis) <= 0.5 * length
+    found = np.empty(len(means), bool)
+    # Block by block and column by column: what is worked on stays in the cache, and means may be views into a file.
+    for lo in range(0, len(means), _BLOCK_ROWS):
+        block = slice(lo, lo + _BLOCK_ROWS)
+        found[block] = _picked_by_place(picked, np.array(means[block].T, np.float64, order="C"))
     return found
 
 
-def _along(means: NDArray[np.floating], axis: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(N,) coordinates along an axis; column by column, since means may be strided views into a file."""
-    along = np.zeros(len(means))
-    for column in range(3):
-        if axis[column] != 0.0:
-            along += axis[column] * np.asarray(means[:, column], np.float64)
-    return along
+def _picked_by_place(picked: PickedBox | PickedBall | PickedSide, points: NDArray[np.float64]) -> FileMask:
+    """(n,) which of some points (3, n), which are overwritten, are picked."""
+    if isinstance(picked, PickedSide):
+        normal = np.asarray(picked.normal, np.float64)
+        normal = normal / np.abs(normal).max()
+        return normal @ points > normal @ np.asarray(picked.point)
+    points -= np.array(picked.center)[:, None]
+    if isinstance(picked, PickedBall):
+        points *= points
+        return points.sum(axis=0) <= picked.radius**2
+    local = quats_to_matrices(np.array([picked.rotate]))[0].T @ points
+    return (np.abs(local) <= 0.5 * np.array(picked.size)[:, None]).all(axis=0)
 
 
 def rows_step(mask: FileMask, *, restores: bool = False) -> RemovalStep:
