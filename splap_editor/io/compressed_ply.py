@@ -12,6 +12,9 @@ from splap_editor.io.splat_columns import SH_C0
 CHUNK = 256
 """Splats that share one chunk's bounds."""
 
+_BLOCK_ROWS = CHUNK << 7
+"""Splats that are decoded at a time."""
+
 
 def packed_splats(evidence: PlyEvidence, layout: Layout) -> tuple[Splats, list[str]]:
     """Decode a compressed table.
@@ -56,37 +59,49 @@ def packed_splats(evidence: PlyEvidence, layout: Layout) -> tuple[Splats, list[s
     for column in layout.packed:
         if table.columns[column].dtype.kind not in "iu" or table.columns[column].dtype.itemsize != 4:
             raise PlyError(f"{table.name} is damaged: {column} is not of type uint. Export it again.")
-    bounds = {column: chunks[column].astype(np.float32) for column in field_types(chunks.dtype)}
-    packed = table.columns["packed_color"].astype(np.uint32)
-    colour = np.stack([(packed >> shift & 255).astype(np.float32) / 255 for shift in (24, 16, 8, 0)], axis=1)
-    rgb: NDArray[np.floating] = colour[:, :3]
-    try:
-        means = _lerped(_unit_11_10_11(table.columns["packed_position"]), bounds, "{}_x", "{}_y", "{}_z")
-        scales = _lerped(
-            _unit_11_10_11(table.columns["packed_scale"]), bounds, "{}_scale_x", "{}_scale_y", "{}_scale_z"
-        )
-        if "min_r" in bounds:
-            rgb = _lerped(rgb, bounds, "{}_r", "{}_g", "{}_b")
-    except KeyError as error:
-        raise PlyError(f"{table.name} is damaged: its chunks lack {error}. Export it again.") from None
-    with np.errstate(divide="ignore", over="ignore"):
-        opacities = np.log(colour[:, 3]) - np.log1p(-colour[:, 3])
-        sh0 = ((rgb - 0.5) / SH_C0).astype(np.float32)
+    harmonics, n_coefficients = _harmonic_rows(table)
     splats = Splats(
-        means=means,
-        log_scales=scales,
-        quats=_smallest_three(table.columns["packed_rotation"].astype(np.uint32)),
-        logit_opacities=opacities,
-        sh0=sh0,
-        shN=_harmonics(table),
+        means=np.empty((n, 3), np.float32),
+        log_scales=np.empty((n, 3), np.float32),
+        quats=np.empty((n, 4), np.float32),
+        logit_opacities=np.empty(n, np.float32),
+        sh0=np.empty((n, 3), np.float32),
+        shN=np.empty((n, 3, n_coefficients), np.float32).transpose(0, 2, 1),
         normal_axis=layout.normal_axis,
     )
+    for lo in range(0, n, _BLOCK_ROWS):
+        hi = min(lo + _BLOCK_ROWS, n)
+        block, within = slice(lo, hi), slice(lo // CHUNK, -(-hi // CHUNK))
+        packed = {column: table.columns[column][block].astype(np.uint32) for column in layout.packed}
+        bounds = {column: chunks[column][within].astype(np.float32) for column in field_types(chunks.dtype)}
+        try:
+            _fill(splats, block, packed, bounds)
+        except KeyError as error:
+            raise PlyError(f"{table.name} is damaged: its chunks lack {error}. Export it again.") from None
+        # A byte at a time through a table, which takes no more memory than the result.
+        for c in range(3 * n_coefficients):
+            splats.shN[block, c % n_coefficients, c // n_coefficients] = _COEFFICIENTS[harmonics[f"f_rest_{c}"][block]]
+        evidence.making(hi / n)
     return splats, []
+
+
+def _fill(splats: Splats, rows: slice, packed: dict[str, NDArray], bounds: dict[str, NDArray]) -> None:
+    """Write what the bits of some rows stand for, but for their harmonics; KeyError names bounds that are missing."""
+    colour = np.stack([(packed["packed_color"] >> shift & 255).astype(np.float32) / 255 for shift in (24, 16, 8, 0)], 1)
+    rgb: NDArray[np.floating] = colour[:, :3]
+    splats.means[rows] = _lerped(_unit_11_10_11(packed["packed_position"]), bounds, "{}_x", "{}_y", "{}_z")
+    shares = _unit_11_10_11(packed["packed_scale"])
+    splats.log_scales[rows] = _lerped(shares, bounds, "{}_scale_x", "{}_scale_y", "{}_scale_z")
+    if "min_r" in bounds:
+        rgb = _lerped(rgb, bounds, "{}_r", "{}_g", "{}_b")
+    splats.quats[rows] = _smallest_three(packed["packed_rotation"])
+    with np.errstate(divide="ignore", over="ignore"):
+        splats.logit_opacities[rows] = np.log(colour[:, 3]) - np.log1p(-colour[:, 3])
+        splats.sh0[rows] = (rgb - 0.5) / SH_C0
 
 
 def _unit_11_10_11(packed: NDArray) -> NDArray[np.float32]:
     """Three numbers in [0, 1] from the bits of one."""
-    packed = packed.astype(np.uint32)
     return np.stack(
         [
             (packed >> 21).astype(np.float32) / 2047,
@@ -121,22 +136,20 @@ def _smallest_three(packed: NDArray[np.uint32]) -> NDArray[np.float32]:
     return quats
 
 
-def _harmonics(table: PlyTable) -> NDArray[np.float32]:
-    """(N, K, 3) coefficients of the ``sh`` element, K = 0 if there is none."""
+_COEFFICIENTS = ((np.concatenate([[0.0], (np.arange(1, 255) + 0.5) / 256, [1.0]]) - 0.5) * 8).astype(np.float32)
+"""What a byte of the harmonics stands for; the ends are met."""
+
+
+def _harmonic_rows(table: PlyTable) -> tuple[NDArray, int]:
+    """Rows of the ``sh`` element and the number K of their coefficients a channel, 0 if there is none."""
     n = table.n_rows
     rows = table.element("sh")
     if rows is None:
-        return np.zeros((n, 0, 3), np.float32)
+        return np.zeros(n, np.uint8), 0
     held = field_types(rows.dtype)
     names = tuple(f"f_rest_{i}" for i in range(len(held)))
     if len(rows) != n or len(names) not in (9, 24, 45, 72) or set(names) != held.keys():
         raise PlyError(f"{table.name} is damaged: its 'sh' element does not fit its splats. Export it again.")
     if any(dtype != np.uint8 for dtype in held.values()):
         raise PlyError(f"{table.name} is damaged: its 'sh' element is not of type uchar. Export it again.")
-    share = (np.arange(256, dtype=np.float32) + 0.5) / 256
-    share[[0, 255]] = 0, 1
-    # A byte at a time through a table, which takes no more memory than the result.
-    coefficients = np.empty((n, len(names)), np.float32)
-    for c, name in enumerate(names):
-        coefficients[:, c] = ((share - 0.5) * 8)[rows[name]]
-    return coefficients.reshape(n, 3, -1).transpose(0, 2, 1)
+    return rows, len(names) // 3

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.splats.splats import Splats
 from splap_editor.io.ply_table import PlyTable
 from splap_editor.io.thresholds import Thresholds, read_thresholds, sibling_npz
@@ -15,6 +16,9 @@ AXIS_NAMES: dict[int | None, str] = {None: "thinnest", 0: "0", 1: "1", 2: "2"}
 """Local axes that may be the surface normal, as they are written after a layout's name."""
 
 CHOSEN = "chosen by hand"
+
+THRESHOLDS_SHARE, SPLATS_SHARE = 0.1, 0.6
+"""Shares of the work that are done once thresholds are read, and once the splats are made."""
 
 
 class PlyEvidence:
@@ -25,17 +29,29 @@ class PlyEvidence:
     table : PlyTable
     path : Path
         The file.
+    progress : Progress
+        Told the share done of reading what lies beside the file, making splats and looking them over; may cancel.
     """
 
-    def __init__(self, table: PlyTable, path: Path) -> None:
+    def __init__(self, table: PlyTable, path: Path, progress: Progress = no_progress) -> None:
         self.table = table
         self.path = path
+        self.progress = progress
 
     @cached_property
     def thresholds(self) -> Thresholds | str | None:
         """SpikingGS thresholds beside the file; a sentence if they are of no use, None if there are none."""
         npz = sibling_npz(self.path)
-        return None if npz is None else read_thresholds(npz, self.table.n_rows)
+        return (
+            None
+            if npz is None
+            else read_thresholds(npz, self.table.n_rows, part_of(self.progress, 0.0, THRESHOLDS_SHARE))
+        )
+
+    @property
+    def making(self) -> Progress:
+        """Told the share of the splats made."""
+        return part_of(self.progress, THRESHOLDS_SHARE, SPLATS_SHARE)
 
     def every(self, column: str, test: Callable[[np.ndarray], np.ndarray]) -> bool:
         """Whether every value of a column passes; a first look at a few spares most files the whole column."""

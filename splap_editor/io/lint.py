@@ -1,14 +1,26 @@
 """What is odd about the splats of a file."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.progress import Progress, no_progress
 from splap_editor.core.splats.splats import Splats
 
 GIANT = 0.25
 """A splat is giant if one standard deviation is longer than this share of the main subject."""
+
+_BLOCK_ROWS = 1 << 15
+_UNUSABLE = {
+    "scales": "{} a scale that is not a number or infinite",
+    "opacities": "{} an opacity that is not a number",
+    "rotations": "{} a rotation that is not finite",
+    "zero_rotations": "{} a zero rotation",
+    "filters": "{} a filter_3D that is not finite",
+    "colours": "{} a colour that is not finite",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,32 +44,44 @@ class Finding:
     rows: NDArray[np.int64]
 
 
-def unusable_rows(splats: Splats) -> list[Finding]:
+def unusable_rows(splats: Splats, progress: Progress = no_progress) -> list[Finding]:
     """Rows that cannot be drawn or deformed: not finite, or without a rotation.
 
     Infinite opacity (opaque) and scales of ``-inf`` (flat) are legal. One pass
-    over each column; nothing is converted.
+    over each column; nothing is converted. ``progress`` is told the share of
+    rows, and may cancel.
     """
-    scales, quats = splats.log_scales, splats.quats
-    opacities = splats.logit_opacities
-    findings: list[Finding] = []
-    if not _finite(scales):
-        bad = (np.isnan(scales) | (scales == np.inf)).any(axis=1)
-        _add(findings, "scales", "{} a scale that is not a number or infinite", bad)
-    if not _finite(opacities):
-        _add(findings, "opacities", "{} an opacity that is not a number", np.isnan(opacities))
-    if not _finite(quats):
-        _add(findings, "rotations", "{} a rotation that is not finite", ~np.isfinite(quats).all(axis=1))
-    zero = np.flatnonzero(quats[:, 0] == 0)
-    zero = zero[(quats[zero] == 0).all(axis=1)]
-    if len(zero):
-        findings.append(Finding("zero_rotations", _sentence("{} a zero rotation", len(zero)), zero))
-    if splats.filter_radii is not None:
-        _add(findings, "filters", "{} a filter_3D that is not finite", ~np.isfinite(splats.filter_radii))
-    if not (_finite(splats.sh0) and _finite(splats.shN)):
-        bad = ~(np.isfinite(splats.sh0).all(axis=1) & np.isfinite(splats.shN).all(axis=(1, 2)))
-        _add(findings, "colours", "{} a colour that is not finite", bad)
+    found: dict[str, list[NDArray[np.int64]]] = {kind: [] for kind in _UNUSABLE}
+    for lo in range(0, splats.n_splats, _BLOCK_ROWS):
+        for kind, bad in _unusable(splats, slice(lo, lo + _BLOCK_ROWS)):
+            found[kind].append(lo + np.flatnonzero(bad))
+        progress(lo / splats.n_splats)
+    findings = []
+    for kind, blocks in found.items():
+        rows = np.concatenate(blocks) if blocks else np.zeros(0, np.int64)
+        if len(rows):
+            findings.append(Finding(kind, _sentence(_UNUSABLE[kind], len(rows)), rows))
     return findings
+
+
+def _unusable(splats: Splats, block: slice) -> Iterator[tuple[str, NDArray[np.bool_]]]:
+    """What is unusable about some rows, of those kinds that may have any."""
+    scales, quats, opacities = splats.log_scales[block], splats.quats[block], splats.logit_opacities[block]
+    sh0, shN = splats.sh0[block], splats.shN[block]
+    if not _finite(scales):
+        yield "scales", (np.isnan(scales) | (scales == np.inf)).any(axis=1)
+    if not _finite(opacities):
+        yield "opacities", np.isnan(opacities)
+    if not _finite(quats):
+        yield "rotations", ~np.isfinite(quats).all(axis=1)
+    zero = quats[:, 0] == 0
+    if zero.any():
+        zero[zero] = (quats[zero] == 0).all(axis=1)
+        yield "zero_rotations", zero
+    if splats.filter_radii is not None:
+        yield "filters", ~np.isfinite(splats.filter_radii[block])
+    if not (_finite(sh0) and _finite(shN)):
+        yield "colours", ~(np.isfinite(sh0).all(axis=1) & np.isfinite(shN).all(axis=(1, 2)))
 
 
 def lint(splats: Splats) -> list[Finding]:

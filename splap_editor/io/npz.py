@@ -7,6 +7,8 @@ from typing import IO, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.progress import Cancelled, Progress, no_progress
+
 _MAGIC = b"\x93NUMPY"
 _LONGEST_HEADER = 4096
 _MOST_MEMBERS = 256
@@ -34,6 +36,8 @@ class NpzFile:
         Seekable; may have other bytes before the archive. The caller closes it.
     most_bytes : int
         Largest sum of the arrays that are read, unpacked.
+    progress : Progress
+        Told the share of an array for each MiB of it; may cancel.
 
     Raises
     ------
@@ -43,8 +47,9 @@ class NpzFile:
         It cannot be read.
     """
 
-    def __init__(self, file: BinaryIO, most_bytes: int) -> None:
+    def __init__(self, file: BinaryIO, most_bytes: int, progress: Progress = no_progress) -> None:
         self._left = most_bytes
+        self._progress = progress
         self._archive = _guarded(lambda: zipfile.ZipFile(file))
         members = self._archive.infolist()
         if len(members) > _MOST_MEMBERS:
@@ -111,11 +116,11 @@ class NpzFile:
             if n_bytes > most_bytes:
                 raise NpzError(f"{name} is larger than {most_bytes:,} bytes")
             flat = np.empty(n_bytes // dtype.itemsize, dtype)
-            _fill(member, flat.view(np.uint8), name)
+            _fill(member, flat.view(np.uint8), name, self._progress)
         return flat.reshape(shape, order="F" if found[2] == b"True" else "C")
 
 
-def _fill(member: IO[bytes], data: NDArray[np.uint8], name: str) -> None:
+def _fill(member: IO[bytes], data: NDArray[np.uint8], name: str, progress: Progress) -> None:
     done = 0
     while done < len(data):
         chunk = member.read(min(len(data) - done, 1 << 20))
@@ -123,6 +128,7 @@ def _fill(member: IO[bytes], data: NDArray[np.uint8], name: str) -> None:
             raise NpzError(f"{name} is cut short")
         data[done : done + len(chunk)] = np.frombuffer(chunk, np.uint8)
         done += len(chunk)
+        progress(done / len(data))
     # The check sum is compared where the member ends.
     if member.read(1):
         raise NpzError(f"{name} is longer than it says")
@@ -132,7 +138,7 @@ def _guarded(call):
     """Run a call into the zip reader; what a damaged archive makes it raise becomes one kind of error."""
     try:
         return call()
-    except (NpzError, OSError):
+    except (NpzError, OSError, Cancelled):
         raise
     # zipfile and zlib raise a dozen kinds, from struct.error to NotImplementedError, and each version its own.
     except Exception as error:

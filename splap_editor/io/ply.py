@@ -14,7 +14,7 @@ from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.splats.splats import Splats
 from splap_editor.io.atomic_file import atomic_file
 from splap_editor.io.formats.bare_splats import THIN_LOG_SCALE
-from splap_editor.io.layout import COMMON_NAMES, Layout, PlyEvidence
+from splap_editor.io.layout import COMMON_NAMES, SPLATS_SHARE, Layout, PlyEvidence
 from splap_editor.io.layouts import layout_of, require_splats
 from splap_editor.io.lint import unusable_rows
 from splap_editor.io.ply_header import PlyError
@@ -78,7 +78,7 @@ def read_ply(path: str | os.PathLike[str], *, layout: str | None = None, progres
     path = Path(path)
     glance = _Glance()
     table = read_table(path, accepts=require_splats, glance=glance.look, progress=part_of(progress, 0.0, 0.9))
-    evidence = PlyEvidence(table, path)
+    evidence = PlyEvidence(table, path, part_of(progress, 0.9, 1.0))
     found = layout_of(evidence, chosen=layout)
     file = splat_file(evidence, found, is_usable=glance.shows_only_usable_rows(table.n_rows))
     progress(1.0)
@@ -109,8 +109,9 @@ def splat_file(
     if layout.bound:
         warnings.append(_BOUND.format(layout.name))
     if layout.activated_opacity or not is_usable:
+        told = part_of(evidence.progress, SPLATS_SHARE, 1.0)
         _require_usable_positions(splats.means, evidence.path.name)
-        warnings += [f"{finding.sentence}; left as they are." for finding in unusable_rows(splats)]
+        warnings += [f"{finding.sentence}; left as they are." for finding in unusable_rows(splats, told)]
     return SplatFile(evidence.path, splats, evidence.table, layout, warnings, format_name)
 
 

@@ -5,6 +5,8 @@ import stat
 from io import FileIO
 from pathlib import Path
 
+from splap_editor.core.progress import Progress, no_progress
+
 MOST_TEXT_BYTES = 64 << 20
 """Largest recipe or session that is read."""
 
@@ -43,8 +45,10 @@ def open_regular(path: str | os.PathLike[str], most_bytes: int | None = None) ->
         raise
 
 
-def regular_bytes(path: str | os.PathLike[str], most_bytes: int = MOST_TEXT_BYTES) -> bytes:
-    """All bytes of a regular file of at most that size.
+def regular_bytes(
+    path: str | os.PathLike[str], most_bytes: int = MOST_TEXT_BYTES, progress: Progress = no_progress
+) -> bytes:
+    """All bytes of a regular file of at most that size; ``progress`` is told the share for each MiB, and may cancel.
 
     Raises
     ------
@@ -52,10 +56,11 @@ def regular_bytes(path: str | os.PathLike[str], most_bytes: int = MOST_TEXT_BYTE
         As `open_regular`.
     """
     with open_regular(path, most_bytes) as file:
-        data = bytearray()
+        data, n_bytes = bytearray(), os.fstat(file.fileno()).st_size
         # A file may grow while it is read.
         while len(data) <= most_bytes and (chunk := file.read(1 << 20)):
             data += chunk
+            progress(min(len(data) / max(n_bytes, 1), 1.0))
     if len(data) > most_bytes:
         raise OSError(0, f"it grew past {most_bytes:,} bytes while it was read", str(path))
     return bytes(data)

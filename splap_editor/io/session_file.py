@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.progress import Progress, no_progress
+from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.timeline import LAST_FRAME, Key, Timeline
 from splap_editor.io.atomic_file import atomic_file
 from splap_editor.io.json_object import JsonObject, json_lines, parsed_json, shown
@@ -70,8 +70,11 @@ def content_hash(path: str | os.PathLike[str], progress: Progress = no_progress)
     return f"blake2b:{digest.hexdigest()}"
 
 
-def read_session_file(path: str | os.PathLike[str]) -> SessionFile:
+def read_session_file(path: str | os.PathLike[str], progress: Progress = no_progress) -> SessionFile:
     """Read a session file; the PLY it names is not looked at.
+
+    ``progress`` is told the share of bytes read for each MiB, and once more
+    when all is parsed, which takes seconds for the largest.
 
     Raises
     ------
@@ -80,13 +83,15 @@ def read_session_file(path: str | os.PathLike[str]) -> SessionFile:
     """
     path = Path(path)
     try:
-        data = regular_bytes(path)
+        data = regular_bytes(path, progress=part_of(progress, 0.0, 0.5))
     except OSError as error:
         raise SessionFileError(f"{path} cannot be read: {error.strerror or error}. Check the path.") from error
     try:
-        return session_from_json(parsed_json(data, SessionFileError))
+        session = session_from_json(parsed_json(data, SessionFileError))
     except SessionFileError as error:
         raise SessionFileError(f"{path.name}: {error}.") from None
+    progress(1.0)
+    return session
 
 
 def write_session_file(path: str | os.PathLike[str], session: SessionFile) -> None:

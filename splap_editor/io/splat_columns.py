@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.splats.splats import Splats
 from splap_editor.io.layout import ColumnNames, Layout, PlyEvidence
 from splap_editor.io.ply_header import PlyError
@@ -15,6 +16,7 @@ from splap_editor.io.thresholds import Thresholds
 SH_C0 = 0.28209479177387814
 _REST_COUNTS = (0, 9, 24, 45, 72)
 _BLOCK_ROWS = 1 << 12
+_REPORT_ROWS = 1 << 15
 
 
 @dataclass(frozen=True)
@@ -97,20 +99,29 @@ def plain_splats(
     table = evidence.table
     columns, held = splat_columns(table, layout.columns), table.columns
     n_rest = len(columns.sh_rest)
-    rest = column_group(held, columns.sh_rest) if n_rest else np.zeros((table.n_rows, 0), np.float32)
-    sh0 = column_group(held, columns.sh0)
+    groups = (columns.sh_rest, columns.sh0, (columns.opacity,), columns.means, columns.log_scales, columns.quats)
+    n_columns, n_done = sum(map(len, groups)) + 1, 0
+
+    def group(names: tuple[str, ...]) -> NDArray[np.floating]:
+        nonlocal n_done
+        start, n_done = n_done, n_done + len(names)
+        return column_group(held, names, part_of(evidence.making, start / n_columns, n_done / n_columns))
+
+    rest = group(columns.sh_rest) if n_rest else np.zeros((table.n_rows, 0), np.float32)
+    sh0 = group(columns.sh0)
     if columns.is_rgb:
         sh0 = sh0_of_rgb(sh0, held[columns.sh0[0]].dtype)
-    opacities = column_group(held, (columns.opacity,))[:, 0]
+    opacities = group((columns.opacity,))[:, 0]
     if layout.activated_opacity:
         opacities = logits(opacities, thresholds.opacity_floor if thresholds is not None else 0.0)
+    means, log_scales, quats = group(columns.means), group(columns.log_scales), group(columns.quats)
     filter_radii = None
     if columns.filter_radius is not None:
-        filter_radii = column_group(held, (columns.filter_radius,))[:, 0]
+        filter_radii = group((columns.filter_radius,))[:, 0]
     splats = Splats(
-        means=column_group(held, columns.means),
-        log_scales=column_group(held, columns.log_scales),
-        quats=column_group(held, columns.quats),
+        means=means,
+        log_scales=log_scales,
+        quats=quats,
         logit_opacities=opacities,
         sh0=sh0,
         shN=rest.reshape(table.n_rows, 3, n_rest // 3).transpose(0, 2, 1),
@@ -136,7 +147,9 @@ _NO_THRESHOLDS = (
 )
 
 
-def column_group(columns: dict[str, NDArray], names: tuple[str, ...]) -> NDArray[np.floating]:
+def column_group(
+    columns: dict[str, NDArray], names: tuple[str, ...], progress: Progress = no_progress
+) -> NDArray[np.floating]:
     """Put columns side by side as one array of native, aligned floats.
 
     Parameters
@@ -145,6 +158,8 @@ def column_group(columns: dict[str, NDArray], names: tuple[str, ...]) -> NDArray
         Columns by name, of any numeric type and byte order.
     names : tuple of str
         The C columns wanted.
+    progress : Progress
+        Told the share of rows copied; may cancel.
 
     Returns
     -------
@@ -163,6 +178,8 @@ def column_group(columns: dict[str, NDArray], names: tuple[str, ...]) -> NDArray
         for lo in range(0, len(group), _BLOCK_ROWS):
             for c, part in enumerate(parts):
                 group[lo : lo + _BLOCK_ROWS, c] = part[lo : lo + _BLOCK_ROWS]
+            if lo % _REPORT_ROWS == 0:
+                progress(lo / len(group))
     return group
 
 

@@ -60,7 +60,7 @@ def read_splats(
         for the user and what to do.
     """
     path = Path(path)
-    source = Source(path)
+    source = Source(path, part_of(progress, 0.0, 0.2))
     try:
         row = format_of(path, source.head(GLANCE))
     except OSError:
@@ -69,12 +69,12 @@ def read_splats(
     if row.is_ply:
         return read_ply(path, layout=layout, progress=progress)
     try:
-        table, warnings = row.read(source, part_of(progress, 0.0, 0.9))
+        table, warnings = row.read(source, part_of(progress, 0.2, 0.9))
     except MemoryError:
         raise FormatError(
             f"{path.name} does not fit in memory. Close other programs or crop the scene first."
         ) from None
-    evidence = PlyEvidence(table, path)
+    evidence = PlyEvidence(table, path, part_of(progress, 0.9, 1.0))
     found = (
         layout_of(evidence, chosen=layout) if layout else replace(LAYOUTS["3dgs"], reason=f"decoded from {row.title}")
     )

@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.progress import Progress, no_progress
+
 
 @dataclass(frozen=True, eq=False)
 class Thresholds:
@@ -32,7 +34,7 @@ def sibling_npz(path: str | os.PathLike[str]) -> Path | None:
     return next((candidate for candidate in candidates if candidate.is_file()), None)
 
 
-def read_thresholds(npz: Path, n_splats: int) -> Thresholds | str:
+def read_thresholds(npz: Path, n_splats: int, progress: Progress = no_progress) -> Thresholds | str:
     """Read the thresholds of the splats of a PLY.
 
     Parameters
@@ -41,6 +43,8 @@ def read_thresholds(npz: Path, n_splats: int) -> Thresholds | str:
         The trainer's archive.
     n_splats : int
         Rows of the PLY; the archive's rows must be the same ones.
+    progress : Progress
+        Told the share of an array for each MiB of it; may cancel.
 
     Returns
     -------
@@ -55,7 +59,7 @@ def read_thresholds(npz: Path, n_splats: int) -> Thresholds | str:
     try:
         with open_regular(npz) as file:
             # As many numbers as the splats need, and what little more an archive may hold.
-            archive = NpzFile(file, most_bytes=16 * n_splats + 1024)
+            archive = NpzFile(file, most_bytes=16 * n_splats + 1024, progress=progress)
             if "Vth_pdf" not in archive.names:
                 return f"{npz.name} beside the file holds no Vth_pdf: it is read without thresholds."
             n_rows = math.prod(archive.shape("Vth_pdf"))

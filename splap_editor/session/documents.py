@@ -148,7 +148,7 @@ class Documents:
         """Open a session file and the PLY it belongs to."""
 
         def read(job: Job) -> _Arrival:
-            session = read_session_file(path)
+            session = read_session_file(path, job.progress("reading the session"))
             return _Arrival(session, path, False, [], lambda: None)
 
         self._open(f"Opening {path.name}", read, path.parent)

@@ -58,8 +58,7 @@ class OpenedScene:
 def opened_scene(job: Job, request: OpenRequest) -> OpenedScene:
     """Read a splat file and find its ellipses."""
     file = read_splats(request.path, layout=request.layout, progress=job.progress("reading"))
-    job.report(1.0, "occupancy")
-    scene = Scene(file, occupancy_ellipses(file.splats))
+    scene = Scene(file, occupancy_ellipses(file.splats, progress=job.progress("occupancy")))
     hand_over = request.depictor.depict(file.splats)
     if request.restore is not None:
         request.restore(scene)

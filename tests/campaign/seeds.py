@@ -125,9 +125,9 @@ def _other(ending: str, which: int) -> bytes:
     n, degree = int(rng.integers(1, 12)), int(rng.integers(0, 4))
     n_rest = (degree + 1) ** 2 - 1
     if ending == "splat":
-        return _splat_records(n, rng).tobytes()
+        return splat_records(n, rng).tobytes()
     if ending == "ksplat":
-        return _ksplat_bytes(n, rng)
+        return ksplat_bytes(n, rng)
     quats = rng.normal(size=(n, 4)).astype("f4")
     splats = Splats(
         means=rng.normal(size=(n, 3)).astype("f4"),
@@ -144,7 +144,8 @@ def _other(ending: str, which: int) -> bytes:
     return out.getvalue()
 
 
-def _splat_records(n: int, rng: np.random.Generator) -> np.ndarray:
+def splat_records(n: int, rng: np.random.Generator) -> np.ndarray:
+    """Rows of a ``.splat``."""
     records = np.zeros(n, RECORD)
     records["mean"] = rng.normal(size=(n, 3))
     records["scale"] = rng.random((n, 3))
@@ -153,7 +154,8 @@ def _splat_records(n: int, rng: np.random.Generator) -> np.ndarray:
     return records
 
 
-def _ksplat_bytes(n: int, rng: np.random.Generator) -> bytes:
+def ksplat_bytes(n: int, rng: np.random.Generator) -> bytes:
+    """A ``.ksplat`` of one section, at any level of compression."""
     level = int(rng.integers(3))
     degree = int(rng.integers(3))
     head, section = bytearray(4096), bytearray(1024)

@@ -14,7 +14,10 @@ import splap_editor
 from splap_editor.core.progress import Cancelled
 from splap_editor.engine.cache import HEAD, MAGIC
 from splap_editor.io.ply import PlyError, read_ply
-from splap_editor.io.session_file import content_hash
+from splap_editor.io.session_file import content_hash, read_session_file
+from splap_editor.io.splat_files import read_splats, write_splats
+from splap_editor.io.thresholds import read_thresholds
+from tests.campaign.seeds import ksplat_bytes, splat_records
 from tests.reference.ply import compressed_bytes, ply_bytes, splat_columns
 
 MEASURED = """
@@ -40,6 +43,8 @@ print(peak() - before)
 """
 BASE = 256 << 20
 N = 1 << 16
+MOST_ROWS = 1 << 15
+"""Between two moments at which reading can be stopped; a MiB of bytes otherwise."""
 
 
 def repeated(columns, times, **options):
@@ -197,7 +202,7 @@ print(peak() - before)
     assert int(done.stdout) <= 8 * path.stat().st_size + beside
 
 
-@pytest.mark.parametrize("case", ["binary", "text", "uneven faces", "lists among the columns"])
+@pytest.mark.parametrize("case", ["binary", "big endian", "text", "packed", "uneven faces", "lists among the columns"])
 def test_reading_asks_often_whether_it_shall_stop(case, tmp_path):
     path = tmp_path / "scene.ply"
     path.write_bytes(CASES[case]())
@@ -206,6 +211,9 @@ def test_reading_asks_often_whether_it_shall_stop(case, tmp_path):
     assert shares == sorted(shares) and shares[-1] == 1.0
     # At least once for each MiB that is read, and again for each that is parsed.
     assert len(shares) >= path.stat().st_size >> 20
+    if case in ("big endian", "packed"):
+        # Once more for each block of rows that is converted, and looked over.
+        assert sum(share > 0.9 for share in shares) >= 2 * (N // MOST_ROWS)
     for stop in (1, len(shares) // 2, len(shares) - 1):
         asked = []
 
@@ -217,6 +225,66 @@ def test_reading_asks_often_whether_it_shall_stop(case, tmp_path):
         with pytest.raises(Cancelled):
             read_ply(path, progress=cancel)
     assert file.table.n_rows in (4, N)
+
+
+def splats_of(n):
+    columns = splat_columns(256, np.random.default_rng(0), n_rest=9)
+    return repeated(columns, n // 256)
+
+
+@pytest.mark.parametrize("ending", ["spz", "sog", "glb", "splat", "ksplat"])
+def test_reading_other_formats_asks_often_whether_it_shall_stop(ending, tmp_path):
+    path = tmp_path / f"scene.{ending}"
+    rng = np.random.default_rng(0)
+    if ending == "splat":
+        path.write_bytes(splat_records(N, rng).tobytes())
+    elif ending == "ksplat":
+        path.write_bytes(ksplat_bytes(N, rng))
+    else:
+        (tmp_path / "scene.ply").write_bytes(splats_of(N))
+        file = read_ply(tmp_path / "scene.ply")
+        write_splats(path, file, file.splats)
+    shares = []
+    file = read_splats(path, progress=shares.append)
+    assert file.splats.n_splats == N and file.format_name == {"glb": "gltf"}.get(ending, ending)
+    assert shares == sorted(shares) and shares[-1] == 1.0
+    assert sum(share <= 0.2 for share in shares) >= path.stat().st_size >> 20
+    assert sum(0.2 < share <= 0.9 for share in shares) >= N // MOST_ROWS
+
+    for stop in range(0, len(shares), 3):
+        asked = []
+
+        def cancel(share, asked=asked, stop=stop):
+            asked.append(share)
+            if len(asked) > stop:
+                raise Cancelled
+
+        with pytest.raises(Cancelled):
+            read_splats(path, progress=cancel)
+        assert len(asked) == stop + 1, "it is not asked again"
+
+
+def test_reading_what_lies_beside_asks_for_each_mebibyte_whether_it_shall_stop(tmp_path):
+    (tmp_path / "beside.npz").write_bytes(archive(np.savez_compressed))
+    shares = []
+    assert not isinstance(read_thresholds(tmp_path / "beside.npz", N_NUMBERS, shares.append), str)
+    assert shares == sorted(shares) and len(shares) >= 4 * N_NUMBERS >> 20
+    with pytest.raises(Cancelled):
+        read_thresholds(tmp_path / "beside.npz", N_NUMBERS, cancelled)
+
+
+def test_reading_a_session_asks_for_each_mebibyte_whether_it_shall_stop(tmp_path):
+    path = tmp_path / "work.splap"
+    path.write_bytes(session_of_many_numbers())
+    shares = []
+    assert read_session_file(path, shares.append).ply.path == "a.ply"
+    assert shares == sorted(shares) and shares[-1] == 1.0 and len(shares) >= path.stat().st_size >> 20
+    with pytest.raises(Cancelled):
+        read_session_file(path, cancelled)
+
+
+def cancelled(share):
+    raise Cancelled
 
 
 def test_rows_without_columns_before_lists_are_refused_at_once(tmp_path):

@@ -261,11 +261,11 @@ class Door:
         self.opened, self.reached = threading.Event(), threading.Event()
 
     def guarded(self, read):
-        def guarded(path, **options):
+        def guarded(path, progress, **options):
             if path.name.startswith("slow"):
                 self.reached.set()
                 assert self.opened.wait(120.0)
-            return read(path, **{name: value for name, value in options.items() if name != "progress"})
+            return read(path, **options)
 
         return guarded
 

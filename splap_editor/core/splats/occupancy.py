@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.index_spaces import FileMask, FileRows, Nodes
+from splap_editor.core.progress import Progress, no_progress
 from splap_editor.core.splats.main_subject import MainSubject, main_subject
 from splap_editor.core.splats.morton import morton_order
 from splap_editor.core.splats.rotations import quats_to_matrices
@@ -112,7 +113,11 @@ class Ellipses:
 
 
 def occupancy_ellipses(
-    splats: Splats, *, min_contribution: float = MIN_CONTRIBUTION, removed: FileMask | None = None
+    splats: Splats,
+    *,
+    min_contribution: float = MIN_CONTRIBUTION,
+    removed: FileMask | None = None,
+    progress: Progress = no_progress,
 ) -> Ellipses:
     """Ellipses on which the splats contribute visibly.
 
@@ -128,6 +133,8 @@ def occupancy_ellipses(
         Least visible contribution c, in (0, 1).
     removed : (N,) bool, optional
         Splats that are left out: they are inert, and the subject is found without them.
+    progress : Progress
+        Told the share of steps taken, each a pass over all splats; may cancel.
 
     Returns
     -------
@@ -153,22 +160,27 @@ def occupancy_ellipses(
         sigmas = np.take_along_axis(scales, axes[:, :2].astype(np.int64), axis=1)
         thresholds = np.zeros(splats.n_splats) if splats.thresholds is None else np.abs(splats.thresholds)
         levels = np.maximum(thresholds.astype(np.float64), min_contribution / opacities)
+        progress(0.2)
         inert = _inert_reasons(splats, sigmas, opacities, thresholds, min_contribution)
+        progress(0.3)
         if removed is not None:
             inert[removed] = InertReason.REMOVED
         rows = np.flatnonzero(inert == InertReason.ACTIVE)
         rows = rows[morton_order(np.asarray(splats.means[rows], np.float64))]
     centers = np.ascontiguousarray(splats.means[rows], np.float64)
     cutoffs = np.sqrt(-2.0 * np.log(levels[rows]))
+    progress(0.5)
     axes = axes[rows]
     columns = np.take_along_axis(
         quats_to_matrices(np.asarray(splats.quats[rows], np.float64)).swapaxes(1, 2),
         axes[:, :, None].astype(int),
         axis=1,
     )
+    progress(0.6)
     major = cutoffs * sigmas[rows, 0]
     minor = np.maximum(cutoffs * sigmas[rows, 1], NEEDLE_FLOOR * major)
     semi_axes = columns[:, :2] * np.stack([major, minor], axis=1)[:, :, None]
+    progress(0.8)
     return Ellipses(
         rows=rows,
         centers=centers,

@@ -17,14 +17,15 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.progress import Progress
+from splap_editor.core.progress import Progress, part_of
 from splap_editor.core.splats.rotations import matrices_to_quats, quat_products, quats_to_matrices
 from splap_editor.core.splats.splats import Splats
 from splap_editor.io.formats.bare_splats import FAINT, OPAQUE, alphas_of, as_bytes
 from splap_editor.io.formats.source import LARGEST_FILE, Source
 from splap_editor.io.formats.splat32 import log_scales_of
+from splap_editor.io.json_object import parsed_json
 from splap_editor.io.ply_table import PlyTable
-from splap_editor.io.regular_file import regular_bytes
+from splap_editor.io.regular_file import MOST_TEXT_BYTES, regular_bytes
 from splap_editor.io.splat_cells import blank_table
 from splap_editor.io.splat_columns import SH_C0
 
@@ -38,6 +39,10 @@ _JSON, _BIN = b"JSON", b"BIN\0"
 _TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
 _MOST_NODES = 1 << 16
+_MOST_ATTRIBUTES = 20
+"""Four, and a coefficient of the harmonics each."""
+
+_BLOCK_ROWS = 1 << 15
 _EVEN = 1e-4
 
 
@@ -64,7 +69,7 @@ def read(source: Source, progress: Progress) -> tuple[PlyTable, list[str]]:
     FormatError
         If it is damaged, holds no splats, or holds them in a way that is not read.
     """
-    document = _Document(source)
+    document = _Document(source, progress)
     clouds = list(_clouds(document))
     if not clouds:
         raise source.refused("holds no Gaussian splats", f"Choose a file with {EXTENSION} in it.")
@@ -76,9 +81,10 @@ def read(source: Source, progress: Progress) -> tuple[PlyTable, list[str]]:
     table, sheet = blank_table(source.name, n_splats, n_coefficients)
     done = 0
     for cloud in clouds:
-        _fill(sheet, slice(done, done + cloud.n_splats), document, cloud)
-        done += cloud.n_splats
-        progress(done / n_splats)
+        start, done = done, done + cloud.n_splats
+        part = part_of(progress, start / n_splats, done / n_splats)
+        _fill(sheet, slice(start, done), document, cloud, part)
+    progress(1.0)
     warnings = []
     if document.held.get("animations") or document.held.get("skins"):
         warnings.append("Its animation is not read: these are the splats at rest.")
@@ -88,16 +94,14 @@ def read(source: Source, progress: Progress) -> tuple[PlyTable, list[str]]:
 class _Document:
     """The JSON of a glTF and its buffers."""
 
-    def __init__(self, source: Source) -> None:
+    def __init__(self, source: Source, progress: Progress) -> None:
         self.source = source
+        self._progress = progress
         self._binary: memoryview | None = None
         text: bytes | memoryview = source.data
         if source.data[:4] == MAGIC:
             text = self._chunks()
-        try:
-            held = json.loads(bytes(text))
-        except (ValueError, RecursionError):
-            raise source.damaged("its JSON cannot be read") from None
+        held = parsed_json(bytes(text), source.damaged)
         if not isinstance(held, dict):
             raise source.damaged("its JSON is no object")
         self.held: dict[str, Any] = held
@@ -114,6 +118,10 @@ class _Document:
             n_bytes, kind = self.source.unpack("<I4s", at)
             piece = self.source.piece(at + 8, n_bytes)
             if kind == _JSON and text is None:
+                if n_bytes > MOST_TEXT_BYTES:
+                    raise self.source.damaged(
+                        f"its JSON has {n_bytes:,} bytes and at most {MOST_TEXT_BYTES:,} are read"
+                    )
                 text = piece
             elif kind == _BIN and self._binary is None:
                 self._binary = piece
@@ -163,8 +171,9 @@ class _Document:
             raise self.source.refused(
                 f"keeps its numbers in {uri[:80]!r}, which is not beside it", "Export it as a .glb."
             )
+        path = self.source.path.with_name(name)
         try:
-            return memoryview(regular_bytes(self.source.path.with_name(name), LARGEST_FILE))
+            return memoryview(regular_bytes(path, LARGEST_FILE, lambda share: self._progress(0.0)))
         except OSError as error:
             raise self.source.refused(
                 f"keeps its numbers in {name[:80]!r}, which cannot be read ({error.strerror or error})",
@@ -266,10 +275,14 @@ def _cloud(document: _Document, primitive: Any, world: NDArray[np.float64]) -> _
     return _Cloud(attributes, world, n, degree)
 
 
-def _fill(sheet: Splats, rows: slice, document: _Document, cloud: _Cloud) -> None:
+def _fill(sheet: Splats, rows: slice, document: _Document, cloud: _Cloud, progress: Progress) -> None:
     """Write a primitive's splats to some rows, in the axes of a PLY."""
+    n_read = 0
 
     def numbers(name: str, width: int) -> NDArray:
+        nonlocal n_read
+        progress(0.5 * n_read / _MOST_ATTRIBUTES)
+        n_read += 1
         values = document.numbers(cloud.attributes[name], width, name)
         if len(values) != cloud.n_splats:
             raise document.source.damaged(f"{name} has {len(values):,} rows for {cloud.n_splats:,} splats")
@@ -289,19 +302,8 @@ def _fill(sheet: Splats, rows: slice, document: _Document, cloud: _Cloud) -> Non
                 raise document.source.damaged(f"its splats have no {name}")
             shN[:, at] = numbers(name, 3)
             at += 1
-    # Numbers that overflow give positions that are refused by row.
     with np.errstate(invalid="ignore", over="ignore"):
-        if np.abs(world - np.eye(4)).max() > 1e-12:
-            means = means.astype(np.float64) @ world[:3, :3].T + world[:3, 3]
-            quats = quat_products(matrices_to_quats(turn[None]), quats.astype(np.float64))
-            if n_coefficients:
-                from splap_editor.core.splats.spherical_harmonics import rotated_sh
-
-                shN = rotated_sh(shN, np.broadcast_to(turn, (len(shN), 3, 3)))
-        sheet.means[rows] = means
         sheet.log_scales[rows] = log_scales_of(numbers(f"{EXTENSION}:SCALE", 3)) + np.float32(np.log(factor))
-    sheet.quats[rows] = quats
-    sheet.shN[rows] = shN
     alphas = numbers(f"{EXTENSION}:OPACITY", 1)[:, 0].astype(np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
         sheet.logit_opacities[rows] = np.clip(np.log(alphas) - np.log1p(-alphas), FAINT, OPAQUE)
@@ -309,6 +311,27 @@ def _fill(sheet: Splats, rows: slice, document: _Document, cloud: _Cloud) -> Non
         sheet.sh0[rows] = numbers(f"{EXTENSION}:SH_DEGREE_0_COEF_0", 3)
     else:
         sheet.sh0[rows] = 0
+    is_moved = np.abs(world - np.eye(4)).max() > 1e-12
+    for lo in range(0, cloud.n_splats, _BLOCK_ROWS):
+        block = slice(lo, min(lo + _BLOCK_ROWS, cloud.n_splats))
+        to = slice(rows.start + block.start, rows.start + block.stop)
+        parts = means[block], quats[block], shN[block]
+        sheet.means[to], sheet.quats[to], sheet.shN[to] = _moved(*parts, world, turn) if is_moved else parts
+        progress(0.5 + 0.5 * block.stop / cloud.n_splats)
+
+
+def _moved(
+    means: NDArray, quats: NDArray, shN: NDArray, world: NDArray[np.float64], turn: NDArray[np.float64]
+) -> tuple[NDArray, NDArray, NDArray]:
+    """Splats where their node puts them; positions that overflow are refused by row."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        means = means.astype(np.float64) @ world[:3, :3].T + world[:3, 3]
+        quats = quat_products(matrices_to_quats(turn[None]), quats.astype(np.float64))
+        if shN.shape[1]:
+            from splap_editor.core.splats.spherical_harmonics import rotated_sh
+
+            shN = rotated_sh(shN, np.broadcast_to(turn, (len(shN), 3, 3)))
+        return means.astype(np.float32), quats.astype(np.float32), shN
 
 
 def _turn_and_factor(document: _Document, world: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:

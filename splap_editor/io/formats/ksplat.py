@@ -55,14 +55,27 @@ def is_header(start: bytes) -> bool:
 
 @dataclass(frozen=True)
 class _Section:
-    """Where a section's splats are, and what their positions are relative to."""
+    """Where a section's splats are, and what their positions are relative to.
+
+    Full buckets come first, of ``capacity`` rows each, then partial ones, up to the row where each ends.
+    """
 
     records: NDArray
     degree: int
     centers: NDArray[np.float32]
-    bucket_of: NDArray[np.intp]
+    capacity: int
+    n_full: int
+    ends: NDArray[np.int64]
     step: float
     position_range: int
+
+    def buckets(self, lo: int, hi: int) -> NDArray[np.int64]:
+        """Bucket of each row from one to another."""
+        rows = np.arange(lo, hi)
+        beyond = self.n_full + np.searchsorted(self.ends, rows, side="right")
+        # Where all buckets are full the count of rows in them may be beyond any integer of numpy's.
+        n_in_full = min(self.n_full * self.capacity, len(self.records))
+        return np.where(rows < n_in_full, rows // max(self.capacity, 1), beyond)
 
 
 def read(source: Source, progress: Progress) -> tuple[PlyTable, list[str]]:
@@ -120,19 +133,15 @@ def _section(source: Source, level: _Level, head: int, at: int) -> tuple[_Sectio
     partial = np.frombuffer(source.piece(at, 4 * n_partial), "<u4").astype(np.int64)
     start = at + 4 * n_partial + bucket_bytes * n_buckets
     centers = np.zeros((0, 3), np.float32)
-    bucket_of = np.zeros(0, np.intp)
     records = np.frombuffer(source.piece(start, record.itemsize * most), record)[:n]
     if n and level.position_range > 1:
         centers = np.frombuffer(source.piece(at + 4 * n_partial, 12 * n_buckets), "<f4").reshape(-1, 3)
-        last = n_full * capacity + np.cumsum(partial)
-        # Full buckets first, then each partial one up to where it ends.
-        rows = np.arange(n)
-        beyond = n_full + np.searchsorted(last, rows, side="right")
-        bucket_of = np.where(rows < n_full * capacity, rows // max(capacity, 1), beyond)
-        if bucket_of.max() >= n_buckets:
-            raise source.damaged("a section has splats outside its buckets")
     reach = position_range or level.position_range
-    found = _Section(records, degree, centers, bucket_of, block / 2 / reach, reach)
+    ends = min(n_full * capacity, n) + np.cumsum(partial)
+    found = _Section(records, degree, centers, capacity, n_full, ends, block / 2 / reach, reach)
+    # Buckets follow one another: the last row has the last of them.
+    if len(centers) and found.buckets(n - 1, n)[0] >= len(centers):
+        raise source.damaged("a section has splats outside its buckets")
     return found, start + record.itemsize * most
 
 
@@ -147,7 +156,7 @@ def _fill(
             sheet.means[rows] = block["mean"]
         else:
             offsets = (block["mean"].astype(np.float64) - section.position_range) * section.step
-            sheet.means[rows] = offsets + section.centers[section.bucket_of[held]]
+            sheet.means[rows] = offsets + section.centers[section.buckets(held.start, held.stop)]
         sheet.log_scales[rows] = log_scales_of(block["scale"].astype(np.float32))
         sheet.quats[rows] = block["quat"]
         sheet.sh0[rows] = (block["rgba"][:, :3].astype(np.float32) / 255 - 0.5) / np.float32(SH_C0)

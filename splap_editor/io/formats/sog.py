@@ -4,13 +4,13 @@ import io
 import json
 import math
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, BinaryIO, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.progress import Progress
+from splap_editor.core.progress import Cancelled, Progress, part_of
 from splap_editor.core.splats.morton import morton_order
 from splap_editor.core.splats.splats import Splats
 from splap_editor.io.formats.bare_splats import alphas_of, as_bytes, logits_of_bytes
@@ -23,6 +23,7 @@ Result = TypeVar("Result")
 
 _WIDTHS = {3: 192, 8: 512, 15: 960}
 """Pixels across a palette, 64 entries side by side, by the coefficients of an entry."""
+_BLOCK_ROWS = 1 << 15
 _LARGEST_META = 1 << 22
 _LARGEST_PICTURE = 1 << 30
 _IDENTITY_BELOW = 252
@@ -51,27 +52,38 @@ def read(source: Source, progress: Progress) -> tuple[PlyTable, list[str]]:
     n_coefficients = 0 if harmonics is None else harmonics[1].shape[1]
     source.require_room(4 * count * (17 + 3 * n_coefficients))
     table, sheet = blank_table(source.name, count, n_coefficients)
-    _fill_means(sheet, archive, meta)
-    progress(0.3)
-    sheet.quats[...] = _rotations(archive.pixels(_files(archive, meta, "quats", 1)[0], count))
-    progress(0.5)
+    progress(0.1)
+    _fill_means(sheet, archive, meta, part_of(progress, 0.1, 0.4))
+    quats = archive.pixels(_files(archive, meta, "quats", 1)[0], count)
+    for rows in _blocks(count, part_of(progress, 0.4, 0.5)):
+        sheet.quats[rows] = _rotations(quats[rows])
     scales = archive.pixels(_files(archive, meta, "scales", 1)[0], count)
+    progress(0.5)
     colors = archive.pixels(_files(archive, meta, "sh0", 1)[0], count)
     tables = [
         _tables(archive, meta, name, version, n) for name, n in (("scales", 3), ("sh0", 3 if version == 2 else 4))
     ]
-    for c in range(3):
-        sheet.log_scales[:, c] = tables[0][c][scales[:, c]]
-        sheet.sh0[:, c] = tables[1][c][colors[:, c]]
-    sheet.logit_opacities[...] = (logits_of_bytes() if version == 2 else tables[1][3])[colors[:, 3]]
-    progress(0.7)
+    logits = logits_of_bytes() if version == 2 else tables[1][3]
+    for rows in _blocks(count, part_of(progress, 0.6, 0.7)):
+        for c in range(3):
+            sheet.log_scales[rows, c] = tables[0][c][scales[rows, c]]
+            sheet.sh0[rows, c] = tables[1][c][colors[rows, c]]
+        sheet.logit_opacities[rows] = logits[colors[rows, 3]]
     if harmonics is not None:
         labels, entries = harmonics
-        for c in range(3):
-            # A label beyond the palette, of which some writers have a few, shows no view-dependence.
-            sheet.shN[:, :, c] = np.concatenate([entries[:, :, c], np.zeros((1, n_coefficients), np.float32)])[labels]
+        # A label beyond the palette, of which some writers have a few, shows no view-dependence.
+        entries = np.concatenate([entries, np.zeros((1, n_coefficients, 3), np.float32)])
+        for rows in _blocks(count, part_of(progress, 0.7, 1.0)):
+            sheet.shN[rows] = entries[labels[rows]]
     progress(1.0)
     return table, []
+
+
+def _blocks(count: int, progress: Progress) -> Iterator[slice]:
+    """Rows to be filled at a time; ``progress`` may cancel between them."""
+    for lo in range(0, count, _BLOCK_ROWS):
+        progress(lo / count)
+        yield slice(lo, min(lo + _BLOCK_ROWS, count))
 
 
 class _Archive:
@@ -85,7 +97,7 @@ class _Archive:
     def _guarded(self, call: Callable[[], Result]) -> Result:
         try:
             return call()
-        except FormatError:
+        except (FormatError, Cancelled):
             raise
         # zipfile, zlib and pillow raise a dozen kinds, and each version its own.
         except Exception as error:
@@ -179,17 +191,20 @@ def _tables(archive: _Archive, meta: dict[str, Any], part: str, version: int, n:
     return [np.linspace(a, b, 256).astype(np.float32) for a, b in zip(low, high, strict=True)]
 
 
-def _fill_means(sheet: Splats, archive: _Archive, meta: dict[str, Any]) -> None:
+def _fill_means(sheet: Splats, archive: _Archive, meta: dict[str, Any], progress: Progress) -> None:
     """Positions: 16 bits between bounds, on a scale that is linear near the origin and logarithmic far from it."""
     low_name, high_name = _files(archive, meta, "means", 2)[:2]
-    low, high = (archive.pixels(name, sheet.n_splats) for name in (low_name, high_name))
+    low = archive.pixels(low_name, sheet.n_splats)
+    progress(0.3)
+    high = archive.pixels(high_name, sheet.n_splats)
     least, most = (_numbers(archive, meta, "means", key, 3) for key in ("mins", "maxs"))
-    for c in range(3):
-        share = (low[:, c] + high[:, c].astype(np.uint16) * 256) / 65535
-        value = least[c] + ((most[c] - least[c]) or 1.0) * share
-        # A bound that is too large gives a position that is infinite, which is refused by row.
-        with np.errstate(over="ignore"):
-            sheet.means[:, c] = np.sign(value) * np.expm1(np.abs(value))
+    for rows in _blocks(sheet.n_splats, part_of(progress, 0.6, 1.0)):
+        for c in range(3):
+            share = (low[rows, c] + high[rows, c].astype(np.uint16) * 256) / 65535
+            value = least[c] + ((most[c] - least[c]) or 1.0) * share
+            # A bound that is too large gives a position that is infinite, which is refused by row.
+            with np.errstate(over="ignore"):
+                sheet.means[rows, c] = np.sign(value) * np.expm1(np.abs(value))
 
 
 def _rotations(pixels: NDArray[np.uint8]) -> NDArray[np.float32]:

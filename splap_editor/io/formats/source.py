@@ -2,11 +2,12 @@
 
 import os
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from splap_editor.core.progress import Progress, no_progress
 from splap_editor.io.ply_reader import available_memory
 from splap_editor.io.regular_file import open_regular, regular_bytes
 
@@ -25,9 +26,12 @@ class Source:
     Parameters
     ----------
     path : Path
+    progress : Progress
+        Told the share of its bytes that are read; may cancel.
     """
 
     path: Path
+    progress: Progress = field(default=no_progress, repr=False)
 
     @property
     def name(self) -> str:
@@ -56,7 +60,7 @@ class Source:
         """
         try:
             self.require_room(os.stat(self.path).st_size)
-            return regular_bytes(self.path, LARGEST_FILE)
+            return regular_bytes(self.path, LARGEST_FILE, self.progress)
         except OSError as error:
             raise FormatError(f"{self.path} could not be read: {error.strerror or error}.") from error
 
