@@ -21,8 +21,10 @@ def main(stage_path: str, out: str) -> int:
     with contextlib.suppress(ImportError):
         import resource
 
+        _, hard = resource.getrlimit(resource.RLIMIT_AS)
         most = min(available_memory() or 1 << 34, 1 << 36) + (1 << 30)
-        resource.setrlimit(resource.RLIMIT_AS, (most, most))
+        if hard == resource.RLIM_INFINITY or most < hard:
+            resource.setrlimit(resource.RLIMIT_AS, (most, most))
     from pxr import Usd, UsdGeom
 
     stage = Usd.Stage.Open(stage_path)
