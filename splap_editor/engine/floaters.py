@@ -35,8 +35,10 @@ def scene_floaters(
 
 def floating_rows(splats: Splats, removed: FileMask | None, strength: float) -> FileMask:
     """(N,) what floats at a strength among the splats that are left, inert ones never."""
-    ellipses = occupancy_ellipses(splats, removed=removed)
     mask = np.zeros(splats.n_splats, bool)
+    if strength <= 0.0:
+        return mask
+    ellipses = occupancy_ellipses(splats, removed=removed)
     if ellipses.n_nodes:
         mask[ellipses.rows[scene_floaters(splats, ellipses).at(strength)]] = True
     return mask
