@@ -59,7 +59,7 @@ class FirstStart(QObject):
             self.compilation.close()
             self.compilation.keep()
             session = self._session
-            session.tell(None)
+            session.told_job.set_elsewhere(None)
             load = Job("load", "", lambda job: load_view_loops())
             load.done = load.failed = load.stopped = lambda *_: session.release()
             session.view_worker.submit(load)
@@ -70,5 +70,5 @@ class FirstStart(QObject):
         # An empty share would look like work of unknown length.
         self.job.share = max(share, 1e-3)
         self.job.stage = f"{share:.0%}"
-        if not self.compilation.is_done:
-            self._session.tell(self.job)
+        if not self.compilation.is_done and self._session.state != "halted":
+            self._session.told_job.set_elsewhere(self.job)

@@ -21,6 +21,7 @@ from PySide6.QtWidgets import QApplication
 
 from splap_editor.app import make_window
 from splap_editor.resources import resource
+from splap_editor.session.edit_file import read_edit
 from splap_editor.ui.theme import apply_theme
 from splap_editor.ui.viewport_widget import ask_of_qt
 
@@ -122,7 +123,7 @@ def weights_picture(person: Person) -> None:
     session.open(resource("samples", "tube.ply"))
     run_until(lambda: session.scene is not None and session.scene.file.path.name == "tube.ply")
     person.settle()
-    session.open_edit(resource("samples", "tube_chain.json"))
+    session.steps.change_edit(read_edit(resource("samples", "tube_chain.json"), session.shown_scene), "Open edit")
     session.scene.set_active_handles((session.scene.edit.handles[1].handle_id,))
     person.settle()
     window.display.set(mode="splats", weights=True)

@@ -22,4 +22,4 @@ class HandleTool(DiscTool):
 
     def take(self, region: Region, pose: Pose) -> None:
         """Add a handle where the splats are."""
-        self.context.session.add_handle(region, pose=pose)
+        self.context.session.steps.add_handle(region, pose=pose)

@@ -44,7 +44,7 @@ class PinStroke:
         session = self._context.session
         if self._row is not None:
             pin = moved_pin(session.shown_scene, self._pin, self._row)
-            session.change_edit(session.shown_scene.edit.with_pin(pin), "Move pin")
+            session.steps.change_edit(session.shown_scene.edit.with_pin(pin), "Move pin")
 
     def cancel(self) -> None:
         """Leave the pin where it was."""

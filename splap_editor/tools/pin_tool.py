@@ -25,6 +25,6 @@ class PinTool(DiscTool):
     def take(self, region: Region, pose: Pose) -> None:
         """Hold splats at rest by a pin, and what has moved by a handle that keeps its pose."""
         if pose.is_identity:
-            self.context.session.add_pin(region, reach=self.radius_world)
+            self.context.session.steps.add_pin(region, reach=self.radius_world)
         else:
-            self.context.session.add_handle(region, pose=pose, name="Pin")
+            self.context.session.steps.add_handle(region, pose=pose, name="Pin")

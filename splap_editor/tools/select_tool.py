@@ -93,7 +93,9 @@ class SelectTool(Tool):
     def select(self, picked: FileMask, mode: SelectionMode) -> None:
         """Let picked splats meet those selected: one step of the history."""
         session = self.context.session
-        session.change_mask("selection", combined_selection(session.shown_scene.selection, picked, mode), "Select")
+        session.steps.change_mask(
+            "selection", combined_selection(session.shown_scene.selection, picked, mode), "Select"
+        )
 
 
 def picking(

@@ -117,7 +117,7 @@ class SeparateTool(Tool):
             return bool(self.parts)
         self.drop()
         if wanted != graph:
-            session.change_edit(scene.edit.with_options(wanted), "Separate")
+            session.steps.change_edit(scene.edit.with_options(wanted), "Separate")
         return True
 
     def let_go(self, event: KeyEvent) -> bool:

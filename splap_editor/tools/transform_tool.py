@@ -64,7 +64,7 @@ class TransformTool(Tool):
     def key(self, event: KeyEvent) -> bool:
         """Take keys; while something is under way, all that could mean something else."""
         if self.is_active and event.pressed:
-            self.context.session.catch_up()
+            self.context.session.drag.catch_up()
         used = super().key(event)
         return used or (self.is_active and event.pressed and not (event.ctrl or event.alt))
 
@@ -74,7 +74,7 @@ class TransformTool(Tool):
         if self.is_active:
             self.context.viewport.gizmo.cancel()
             self._finish()
-            self.context.session.cancel_preview()
+            self.context.session.drag.cancel()
 
     # At rest ------------------------------------------------------------------------------------------------------
 
@@ -104,7 +104,7 @@ class TransformTool(Tool):
             if self.is_active:
                 self._show(self.context.viewport.gizmo.move(*event.xy, fine=fine, snap=snap))
 
-        self.context.session.drag(go)
+        self.context.session.drag.take(go)
 
     def take(self, event: PointerEvent | KeyEvent) -> None:
         """Make it a step: by Return, by the release of a drag, by the click after a key."""
@@ -156,7 +156,7 @@ class TransformTool(Tool):
             handle_id: pose.moved(delta, np.asarray(handle.region.center, np.float64))
             for handle_id, (handle, pose) in self._starts.items()
         }
-        self.context.session.preview_poses(poses)
+        self.context.session.drag.preview(poses)
         self.context.hud.show(text=self._read_out())
         self.context.viewport.gizmo_changed()
 
@@ -175,7 +175,7 @@ class TransformTool(Tool):
 
     def _commit(self) -> None:
         viewport = self.context.viewport
-        self.context.session.catch_up()
+        self.context.session.drag.catch_up()
         part = viewport.gizmo.dragged
         assert part is not None
         label = _LABELS[part.act]
@@ -185,7 +185,7 @@ class TransformTool(Tool):
         viewport.gizmo.end()
         self._finish()
         if has_moved:
-            self.context.session.commit_preview(label)
+            self.context.session.drag.commit(label)
         viewport.gizmo_changed()
 
     def _finish(self) -> None:

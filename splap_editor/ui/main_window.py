@@ -183,7 +183,7 @@ class MainWindow(FileDrop, QMainWindow):
         session.exported.connect(lambda report: self._refresh())
         self.documents.changed.connect(self._refresh)
         self.inspection.changed.connect(self._refresh)
-        session.job_changed.connect(lambda job: self._refresh())
+        session.told_job.changed.connect(lambda job: self._refresh())
         session.failed.connect(self._on_failed)
         self.deformer_panel.radius_hovered.connect(view.show_free_ring)
         self.deformer_panel.weights.set_action(self.actions_["display.weights"])

@@ -37,11 +37,11 @@ class FramePacer:
         self._is_due = False
         self._held: Callable[[], None] | None = None
         session.state_changed.connect(self._ask)
-        session.pace_frames(self._hold)
+        session.drag.pace(self._hold)
 
     def __call__(self) -> None:
         """Ask for a frame, now or with the pose to come."""
-        if not self._session.awaits_frame or perf_counter() - self._asked_at > PATIENCE_S:
+        if not self._session.drag.awaits_frame or perf_counter() - self._asked_at > PATIENCE_S:
             self._ask()
 
     def drawn(self) -> None:

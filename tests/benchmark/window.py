@@ -139,12 +139,12 @@ def bench_drag(window, heart: Heart, clock: DrawClock, n_splats: int) -> None:
     means = np.asarray(session.scene.splats.means, np.float64)
     top = means[np.argmax(means[:, 2])]
     heart.worst_ms()
-    session.add_handle(Region(top, 0.1))
+    session.steps.add_handle(Region(top, 0.1))
     run_until(lambda: session.state == "settled")
     report(benchmark="blocked", during="bind", n_splats=n_splats, milliseconds=heart.worst_ms(), target=100.0)
-    session.preview_poses({1: Pose((0.0, 0.0, 1e-3))})
+    session.drag.preview({1: Pose((0.0, 0.0, 1e-3))})
     run_until(lambda: session.scene.kernels is not None and session.scene.kernels.changed.any())
-    session.cancel_preview()
+    session.drag.cancel()
     run_until(lambda: session.state == "settled")
     heart.worst_ms()
 

@@ -211,7 +211,7 @@ def _edit(folder: Path, tell: Callable[[int], None]) -> None:
     for number in (1, 2, 3, 4):
         pose = Pose((float(number), 0.0, 0.0))
         edit = Edit(handles=(Handle(1, "one", "#ffffff", Region(np.zeros(3), 0.1), pose),))
-        session.change_edit(edit, "Move handle")
+        session.steps.change_edit(edit, "Move handle")
         main.run_until(lambda edit=edit: wrong or edit in written)
         if wrong:
             raise wrong[0]

@@ -46,13 +46,13 @@ def edit_forever(ply: Path, document: Path, folder: Path):
             tell("kept", state_number(state.edit))
 
     autosave.written.connect(on_written)
-    handle = session.add_handle(Region(np.zeros(3), 0.1))
+    handle = session.steps.add_handle(Region(np.zeros(3), 0.1))
     number = 0
     while True:
         number += 1
         tell("does", number)
         poses = {handle.handle_id: Pose((float(number), 0.0, 0.0))}
-        session.change_edit(session.scene.edit.with_poses(poses), "Move handle")
+        session.steps.change_edit(session.scene.edit.with_poses(poses), "Move handle")
         if number % SAVE_EVERY == 0:
             saved = []
             documents.saved.connect(saved.append)

@@ -63,9 +63,9 @@ class Desk:
         """Move the handle, and wait until that is written."""
         edit = self.scene.edit
         if not edit.handles:
-            self.session.add_handle(Region(np.zeros(3), 0.1), pose=Pose((x, 0.0, 0.0)))
+            self.session.steps.add_handle(Region(np.zeros(3), 0.1), pose=Pose((x, 0.0, 0.0)))
         else:
-            self.session.change_edit(edit.with_poses({edit.handles[0].handle_id: Pose((x, 0.0, 0.0))}), "Move")
+            self.session.steps.change_edit(edit.with_poses({edit.handles[0].handle_id: Pose((x, 0.0, 0.0))}), "Move")
         self.wait_written()
 
     def wait_written(self):
@@ -205,7 +205,7 @@ def test_a_file_without_an_edit_is_set_aside_once_and_the_others_are_offered(tmp
 def test_a_process_told_to_end_writes_what_is_not_written_and_leaves_it(tmp_path):
     desk = Desk(tmp_path / "recovery", delay_s=3600.0)
     desk.open()
-    desk.session.add_handle(Region(np.zeros(3), 0.1), pose=Pose((0.25, 0.0, 0.0)))
+    desk.session.steps.add_handle(Region(np.zeros(3), 0.1), pose=Pose((0.25, 0.0, 0.0)))
     desk.autosave.close(keep=True)
     desk.documents.close()
     desk.session.close()
@@ -234,7 +234,7 @@ def test_a_folder_that_cannot_be_written_is_said_once(tmp_path):
     desk = Desk(tmp_path / "recovery")
     desk.open()
     desk.move(0.1)
-    desk.session.add_handle(Region(np.zeros(3), 0.1))
+    desk.session.steps.add_handle(Region(np.zeros(3), 0.1))
     desk.close()
     assert len(desk.failures) == 1
 

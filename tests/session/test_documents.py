@@ -70,20 +70,24 @@ class Desk:
     def edit(self):
         """Two handles, one disabled and deleted ones before it, a pin, keys, a selection, hidden splats and a set."""
         session, scene = self.session, self.scene
-        gone = session.add_handle(Region(np.array([9.0, 9.0, 9.0]), 1.0))
-        session.change_edit(scene.edit.without_handles([gone.handle_id]), "Delete handle")
-        session.add_handle(rows_region(scene, np.arange(50, 90)), pose=Pose((0.1, 1 / 3, 0.0), (0.8, 0.6, 0.0, 0.0)))
-        second = session.add_handle(Region(np.array([0.1, 0.2, 1 / 3]), 0.07), name="tip")
-        session.add_pin(Region(np.array([0.0, 0.0, -0.5]), 0.2))
-        session.change_edit(scene.edit.with_handle(replace(second, enabled=False, color="#123456")), "Change handle")
-        session.change_edit(keyed_edit(scene.edit), "Set key")
-        session.change_edit(edit_at_frame(scene.edit, 24), "Go to frame 24")
+        gone = session.steps.add_handle(Region(np.array([9.0, 9.0, 9.0]), 1.0))
+        session.steps.change_edit(scene.edit.without_handles([gone.handle_id]), "Delete handle")
+        session.steps.add_handle(
+            rows_region(scene, np.arange(50, 90)), pose=Pose((0.1, 1 / 3, 0.0), (0.8, 0.6, 0.0, 0.0))
+        )
+        second = session.steps.add_handle(Region(np.array([0.1, 0.2, 1 / 3]), 0.07), name="tip")
+        session.steps.add_pin(Region(np.array([0.0, 0.0, -0.5]), 0.2))
+        session.steps.change_edit(
+            scene.edit.with_handle(replace(second, enabled=False, color="#123456")), "Change handle"
+        )
+        session.steps.change_edit(keyed_edit(scene.edit), "Set key")
+        session.steps.change_edit(edit_at_frame(scene.edit, 24), "Go to frame 24")
         handle = scene.edit.handles[0]
-        session.change_edit(scene.edit.with_poses({handle.handle_id: Pose((0.0, 0.0, 0.2))}), "Move handle")
+        session.steps.change_edit(scene.edit.with_poses({handle.handle_id: Pose((0.0, 0.0, 0.2))}), "Move handle")
         mask = np.zeros(scene.splats.n_splats, bool)
         mask[3:30] = True
-        session.change_mask("selection", mask, "Select")
-        session.change_mask("hidden", ~mask, "Hide")
+        session.steps.change_mask("selection", mask, "Select")
+        session.steps.change_mask("hidden", ~mask, "Hide")
         session.history.push(ChangeSelectionSets(scene, {"end": mask}, "Keep selection"))
 
     def close(self):
@@ -139,7 +143,7 @@ def test_an_edit_is_dirty_until_it_is_saved_and_clean_again_when_undone(desk, tm
     desk.open_ply()
     documents, session = desk.documents, desk.session
     assert not documents.is_dirty
-    session.add_handle(Region(np.zeros(3), 0.1), pose=Pose((0.1, 0.0, 0.0)))
+    session.steps.add_handle(Region(np.zeros(3), 0.1), pose=Pose((0.1, 0.0, 0.0)))
     assert documents.is_dirty and documents.would_lose
     desk.save(tmp_path / "a.splap")
     assert not documents.is_dirty and not documents.would_lose
@@ -217,7 +221,7 @@ def test_a_changed_ply_is_said_and_opens(desk, tmp_path):
 
 def test_a_ply_with_too_few_splats_is_refused_and_the_open_scene_stays(desk, tmp_path):
     desk.open_ply()
-    desk.session.add_handle(rows_region(desk.scene, np.array([desk.scene.splats.n_splats - 1])))
+    desk.session.steps.add_handle(rows_region(desk.scene, np.array([desk.scene.splats.n_splats - 1])))
     desk.save(tmp_path / "work.splap")
     held = json.loads((tmp_path / "work.splap").read_text())
     held["recipe"]["handles"][0]["rows"] = [10**9]

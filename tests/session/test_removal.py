@@ -35,12 +35,12 @@ def half(scene):
 
 
 def remove(session, mask):
-    return session.change_removal(session.scene.edit.removal.with_rows(mask), "Delete splats")
+    return session.steps.change_removal(session.scene.edit.removal.with_rows(mask), "Delete splats")
 
 
 def test_removed_splats_are_gone_at_once_and_from_the_surface_soon(main, session):
     scene, mask = session.scene, half(session.scene)
-    session.change_mask("selection", mask, "Select")
+    session.steps.change_mask("selection", mask, "Select")
     size = scene.ellipses.scene_scale
     assert remove(session, mask) == mask.sum()
     np.testing.assert_array_equal(scene.unseen, mask)
@@ -49,13 +49,13 @@ def test_removed_splats_are_gone_at_once_and_from_the_surface_soon(main, session
     assert not mask[scene.surface.ellipses.rows].any()
     assert scene.ellipses is scene.surface.ellipses
     assert scene.ellipses.scene_scale < size
-    session.change_mask("selection", np.ones_like(mask), "Select all")
+    session.steps.change_mask("selection", np.ones_like(mask), "Select all")
     np.testing.assert_array_equal(scene.selection, ~mask)
 
 
 def test_undo_brings_splats_selection_and_file_back(main, session, tmp_path):
     scene, mask = session.scene, half(session.scene)
-    session.change_mask("selection", mask, "Select")
+    session.steps.change_mask("selection", mask, "Select")
     remove(session, mask)
     main.run_until(lambda: session.state == "ready")
     session.history.undo()
@@ -86,10 +86,10 @@ def test_removed_splats_that_are_shown_can_be_selected_and_restored(main, sessio
     remove(session, mask)
     scene.set_shows_removed(True)
     assert not scene.unseen.any()
-    session.change_mask("selection", np.ones_like(mask), "Select all")
+    session.steps.change_mask("selection", np.ones_like(mask), "Select all")
     assert scene.selection.all()
     few = mask & (np.cumsum(mask) <= 10)
-    session.change_removal(scene.edit.removal.with_rows(few, restores=True), "Restore selected")
+    session.steps.change_removal(scene.edit.removal.with_rows(few, restores=True), "Restore selected")
     np.testing.assert_array_equal(scene.removed, mask & ~few)
     np.testing.assert_array_equal(scene.selection, few)
     scene.set_shows_removed(False)
@@ -100,7 +100,7 @@ def test_everything_cannot_be_removed(session):
     with pytest.raises(ValueError, match="keep at least one"):
         remove(session, np.ones(session.scene.splats.n_splats, bool))
     assert session.scene.edit.removed is None
-    assert session.change_removal(Removal(), "Restore all") == 0
+    assert session.steps.change_removal(Removal(), "Restore all") == 0
     assert not session.history.can_undo
 
 

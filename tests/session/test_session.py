@@ -17,6 +17,7 @@ from splap_editor.engine.edit import Pose
 from splap_editor.io.ply import read_ply
 from splap_editor.resources import resource
 from splap_editor.session import work
+from splap_editor.session.edit_file import write_edit
 from splap_editor.session.placement import disc_rows, held_pose, rows_region
 from splap_editor.session.session import Session
 from tests.session.main_thread import MainThread
@@ -54,10 +55,10 @@ def end_rows(scene, sign):
 def bent(main, session, lift=0.3):
     """Pin one end, put a handle on the other and move it; settled."""
     scene = session.scene
-    session.add_pin(rows_region(scene, end_rows(scene, -1)))
-    handle = session.add_handle(rows_region(scene, end_rows(scene, 1)))
-    session.preview_poses({handle.handle_id: Pose((lift, lift, 0.0))})
-    session.commit_preview("Move handle")
+    session.steps.add_pin(rows_region(scene, end_rows(scene, -1)))
+    handle = session.steps.add_handle(rows_region(scene, end_rows(scene, 1)))
+    session.drag.preview({handle.handle_id: Pose((lift, lift, 0.0))})
+    session.drag.commit("Move handle")
     main.run_until(lambda: session.state == "settled")
     return handle
 
@@ -83,14 +84,14 @@ def test_a_drag_shows_poses_and_settles(main, opened):
     shown = []
     scene = opened.scene
     scene.pose_changed.connect(lambda: shown.append(scene.kernels))
-    handle = opened.add_handle(rows_region(scene, end_rows(scene, 1)))
+    handle = opened.steps.add_handle(rows_region(scene, end_rows(scene, 1)))
     main.run_until(lambda: opened.state == "settled")
     for step in range(1, 6):
-        opened.preview_poses({handle.handle_id: Pose((0.05 * step, 0.0, 0.0))})
+        opened.drag.preview({handle.handle_id: Pose((0.05 * step, 0.0, 0.0))})
         before = len(shown)
         main.run_until(lambda before=before: len(shown) > before)
     assert opened.state == "dragging" and len(opened.history._commands) == 1
-    opened.commit_preview("Move handle")
+    opened.drag.commit("Move handle")
     main.run_until(lambda: opened.state == "settled")
     held = np.mean(scene.kernels.means[handle.region.rows] - scene.splats.means[handle.region.rows], axis=0)
     # Ellipses follow their corners, so the held splats' own centres are off by a small share of their size.
@@ -99,12 +100,12 @@ def test_a_drag_shows_poses_and_settles(main, opened):
 
 def test_the_newest_request_wins(main, opened):
     scene = opened.scene
-    handle = opened.add_handle(rows_region(scene, end_rows(scene, 1)))
+    handle = opened.steps.add_handle(rows_region(scene, end_rows(scene, 1)))
     main.run_until(lambda: opened.state == "settled")
     shown = []
     scene.pose_changed.connect(lambda: shown.append(scene.kernels))
     for step in range(1, 101):
-        opened.preview_poses({handle.handle_id: Pose((0.002 * step, 0.0, 0.0))})
+        opened.drag.preview({handle.handle_id: Pose((0.002 * step, 0.0, 0.0))})
     main.run_until(lambda: opened.is_posed)
     assert len(shown) < 50, "requests that came too late are skipped"
 
@@ -126,9 +127,9 @@ def test_undo_and_redo_swap_the_pose(main, opened):
 
 def test_a_cancelled_drag_leaves_no_trace(main, opened):
     scene = opened.scene
-    handle = opened.add_handle(rows_region(scene, end_rows(scene, 1)))
-    opened.preview_poses({handle.handle_id: Pose((0.3, 0.0, 0.0))})
-    opened.cancel_preview()
+    handle = opened.steps.add_handle(rows_region(scene, end_rows(scene, 1)))
+    opened.drag.preview({handle.handle_id: Pose((0.3, 0.0, 0.0))})
+    opened.drag.cancel()
     main.run_until(lambda: opened.state == "settled")
     assert opened.scene.edit.is_identity and not opened.scene.kernels.changed.any()
     assert opened.history.undo_label == "Place handle"
@@ -139,7 +140,7 @@ def test_what_is_exported_is_what_is_shown_and_what_the_command_line_makes(main,
     reports = []
     opened.exported.connect(reports.append)
     assert opened.has_unexported_edit
-    opened.save_edit(tmp_path / "edit.json")
+    write_edit(tmp_path / "edit.json", opened.scene)
     opened.export(tmp_path / "window.ply")
     main.run_until(lambda: reports)
     assert not opened.has_unexported_edit
@@ -155,9 +156,9 @@ def test_the_path_of_the_drag_does_not_matter(main, opened):
     handle = bent(main, opened)
     direct = opened.scene.kernels.means.copy()
     for pose in (Pose((-0.4, 0.1, 0.5)), Pose((0.0, -0.5, 0.2)), Pose((0.3, 0.3, 0.0))):
-        opened.preview_poses({handle.handle_id: pose})
+        opened.drag.preview({handle.handle_id: pose})
         main.run_until(lambda: opened.is_posed)
-    opened.commit_preview("Move handle")
+    opened.drag.commit("Move handle")
     main.run_until(lambda: opened.state == "settled")
     np.testing.assert_array_equal(opened.scene.kernels.means, direct)
 
@@ -166,8 +167,8 @@ def test_export_waits_for_the_pose_to_settle(main, opened, tmp_path):
     handle = bent(main, opened)
     reports = []
     opened.exported.connect(reports.append)
-    opened.preview_poses({handle.handle_id: Pose((-0.2, 0.0, 0.1))})
-    opened.commit_preview("Move handle")
+    opened.drag.preview({handle.handle_id: Pose((-0.2, 0.0, 0.1))})
+    opened.drag.commit("Move handle")
     opened.export(tmp_path / "out.ply")
     main.run_until(lambda: reports)
     assert opened.state == "settled"
@@ -248,11 +249,11 @@ def test_every_job_can_be_cancelled_and_leaves_everything_as_it_was(kind, main, 
     out.write_bytes(b"what was there")
     if kind == "bind":
         monkeypatch.setattr(work, "bind", lambda *args, progress, **more: waits_until_cancelled(started, progress))
-        opened.change_edit(replace(edit, method="bbw"), "Change method")
+        opened.steps.change_edit(replace(edit, method="bbw"), "Change method")
     elif kind == "pose":
         solve = lambda transforms, *, progress, shown: waits_until_cancelled(started, progress)  # noqa: E731
         monkeypatch.setattr(opened.bound.deformer, "solve", solve)
-        opened.change_edit(edit.with_poses({handle.handle_id: Pose((0.1, 0.0, 0.0))}), "Move handle")
+        opened.steps.change_edit(edit.with_poses({handle.handle_id: Pose((0.1, 0.0, 0.0))}), "Move handle")
     else:
         waits = lambda *args, progress, **more: waits_until_cancelled(started, progress)  # noqa: E731
         monkeypatch.setattr(scripting, "write_splats", waits)
@@ -300,7 +301,7 @@ def test_a_second_file_cancels_the_preparing_of_the_first(main, session, monkeyp
 
 def test_a_handle_placed_on_a_moved_part_moves_nothing(main, opened):
     # A second handle frees what lies around it, so all is free from the start.
-    opened.change_edit(opened.scene.edit.with_options(ReachOptions(None)), "Free everything")
+    opened.steps.change_edit(opened.scene.edit.with_options(ReachOptions(None)), "Free everything")
     bent(main, opened)
     scene = opened.scene
     before = scene.kernels.means.copy()
@@ -308,7 +309,7 @@ def test_a_handle_placed_on_a_moved_part_moves_nothing(main, opened):
     row = int(np.argmin(np.linalg.norm(middle - middle.mean(axis=0), axis=1)))
     region = rows_region(scene, disc_rows(scene, row, 0.05))
     pose = held_pose(scene, region)
-    opened.add_handle(region, pose=pose)
+    opened.steps.add_handle(region, pose=pose)
     main.run_until(lambda: opened.state == "settled")
     moved = np.linalg.norm(scene.kernels.means - before, axis=1)
     # Holding a disc rigidly where it bent a little shifts it by a small share of the bend.
@@ -318,7 +319,7 @@ def test_a_handle_placed_on_a_moved_part_moves_nothing(main, opened):
 def test_a_disabled_handle_lets_go(main, opened):
     handle = bent(main, opened)
     edit = opened.scene.edit
-    opened.change_edit(edit.with_handle(replace(edit.handle(handle.handle_id), enabled=False)), "Disable handle")
+    opened.steps.change_edit(edit.with_handle(replace(edit.handle(handle.handle_id), enabled=False)), "Disable handle")
     main.run_until(lambda: opened.state == "ready")
     assert opened.scene.kernels is None
 
@@ -326,14 +327,14 @@ def test_a_disabled_handle_lets_go(main, opened):
 def test_changing_the_graph_prepares_anew(main, opened):
     bent(main, opened)
     edit = opened.scene.edit
-    opened.change_edit(edit.with_options(replace(edit.graph, k=12)), "Change graph")
+    opened.steps.change_edit(edit.with_options(replace(edit.graph, k=12)), "Change graph")
     main.run_until(lambda: opened.state == "settled")
     assert opened.scene.surface.options.k == 12
 
 
 def test_weights_by_bounded_biharmonics_pose_too(main, opened):
     bent(main, opened)
-    opened.change_edit(replace(opened.scene.edit, method="bbw"), "Change method")
+    opened.steps.change_edit(replace(opened.scene.edit, method="bbw"), "Change method")
     main.run_until(lambda: opened.state == "settled")
     assert opened.bound.deformer.weights.shape[1] == 1
     assert opened.scene.kernels.changed.any()
@@ -342,8 +343,8 @@ def test_weights_by_bounded_biharmonics_pose_too(main, opened):
 def test_selection_steps_are_undone_too(opened):
     mask = np.zeros(opened.scene.splats.n_splats, bool)
     mask[5:50] = True
-    opened.change_mask("selection", mask, "Select")
-    opened.change_mask("selection", mask, "Select")
+    opened.steps.change_mask("selection", mask, "Select")
+    opened.steps.change_mask("selection", mask, "Select")
     assert opened.history.undo() and not opened.history.can_undo
     assert not opened.scene.selection.any()
     opened.history.redo()
@@ -362,9 +363,9 @@ def test_closing_while_a_job_runs_ends_cleanly(main, session, monkeypatch):
 def weighed(main, session):
     """Two handles with bounded biharmonic weights."""
     scene = session.scene
-    session.change_edit(replace(scene.edit, method="bbw"), "Change method")
+    session.steps.change_edit(replace(scene.edit, method="bbw"), "Change method")
     for sign in (-1, 1):
-        session.add_handle(rows_region(scene, end_rows(scene, sign)))
+        session.steps.add_handle(rows_region(scene, end_rows(scene, sign)))
     main.run_until(lambda: session.state == "settled")
 
 
@@ -376,7 +377,7 @@ def test_weights_found_before_are_not_solved_for_again(main, opened, monkeypatch
         raise AssertionError("solved although the cache has it")
 
     monkeypatch.setattr("splap_editor.core.bbw.binding.handle_weight", refuse)
-    opened.change_edit(opened.scene.edit.with_options(BbwOptions(blending="linear")), "Change blending")
+    opened.steps.change_edit(opened.scene.edit.with_options(BbwOptions(blending="linear")), "Change blending")
     main.run_until(lambda: opened.state == "settled")
     assert opened.failures == []
     assert opened.bound.deformer is not kept
@@ -397,7 +398,7 @@ def test_cancelling_the_weights_leaves_scene_and_cache_as_they_were(main, opened
 
     with monkeypatch.context() as patched:
         patched.setattr("splap_editor.core.bbw.binding.handle_weight", slow)
-        opened.change_edit(
+        opened.steps.change_edit(
             replace(scene.edit, handles=tuple(replace(h, cage_radius=None) for h in scene.edit.handles)), "Change cage"
         )
         main.run_until(under_way.is_set)

@@ -65,7 +65,7 @@ def test_hide_isolate_and_show_all_change_what_is_drawn(driver):
     actions, scene = driver.window.actions_, driver.scene
     selection = scene.selection.copy()
     selection[:100] = True
-    driver.session.change_mask("selection", selection, "Select")
+    driver.session.steps.change_mask("selection", selection, "Select")
     actions["select.isolate"].trigger()
     assert scene.hidden.sum() == scene.splats.n_splats - 100
     actions["select.show_all"].trigger()

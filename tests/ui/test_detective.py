@@ -99,7 +99,7 @@ def test_every_guess_can_be_overridden_and_recognised_again(driver, thick_file):
 
 def test_an_edit_is_not_lost_by_reading_anew(driver, thick_file):
     opened(driver, thick_file)
-    driver.session.add_handle(Region(driver.scene.ellipses.centers[0], 0.1), pose=Pose((0.0, 0.0, 0.2)))
+    driver.session.steps.add_handle(Region(driver.scene.ellipses.centers[0], 0.1), pose=Pose((0.0, 0.0, 0.2)))
     driver.wait_idle()
     scene, form = driver.scene, driver.window.scene_panel.layout_form
     choose(form.axes, 0)

@@ -37,9 +37,9 @@ def driver(empty_window, qtbot, ply):
 
 
 def bend(driver, x=0.1):
-    handle = driver.session.add_handle(Region(driver.scene.ellipses.centers[0], 0.1))
-    driver.session.preview_poses({handle.handle_id: Pose((x, 0.0, 0.0))})
-    driver.session.commit_preview("Move handle")
+    handle = driver.session.steps.add_handle(Region(driver.scene.ellipses.centers[0], 0.1))
+    driver.session.drag.preview({handle.handle_id: Pose((x, 0.0, 0.0))})
+    driver.session.drag.commit("Move handle")
     driver.wait_idle()
 
 
@@ -175,7 +175,7 @@ def leave_behind(driver, qtbot, ply, x):
     session.open(ply)
     qtbot.waitUntil(lambda: run() and session.scene is not None, timeout=WAIT_MS)
     session.halt()
-    session.add_handle(Region(session.scene.ellipses.centers[0], 0.1), pose=Pose((x, 0.0, 0.0)))
+    session.steps.add_handle(Region(session.scene.ellipses.centers[0], 0.1), pose=Pose((x, 0.0, 0.0)))
     qtbot.waitUntil(lambda: run() and any(autosave._folder.glob("*.splap")), timeout=WAIT_MS)
     autosave._slot.lock.release()
     autosave._slot = None

@@ -37,7 +37,7 @@ def idle():
             window.autosave._delay_s = 3600.0
         else:
             window.autosave.written.connect(lambda state: print("kept", flush=True))
-        session.add_handle(Region(session.scene.ellipses.centers[0], 0.1), pose=Pose((0.25, 0.0, 0.0)))
+        session.steps.add_handle(Region(session.scene.ellipses.centers[0], 0.1), pose=Pose((0.25, 0.0, 0.0)))
         QTimer.singleShot(20, idle)
     else:
         print("idle", len(list(crash_folder().iterdir())), flush=True)

@@ -61,11 +61,11 @@ def seen(driver):
 def base_edit(driver):
     """Handles with poses, a pin, keys at two frames."""
     centers = driver.scene.ellipses.centers
-    driver.session.add_pin(Region(centers[np.argmin(centers[:, 0])], 0.1))
-    driver.session.add_handle(Region(centers[np.argmax(centers[:, 0])], 0.1), pose=Pose((0.05, 0.0, 0.1)))
+    driver.session.steps.add_pin(Region(centers[np.argmin(centers[:, 0])], 0.1))
+    driver.session.steps.add_handle(Region(centers[np.argmax(centers[:, 0])], 0.1), pose=Pose((0.05, 0.0, 0.1)))
     edit = keyed_edit(driver.scene.edit)
     edit = keyed_edit(replace(edit, timeline=replace(edit.timeline, frame=9)))
-    driver.session.change_edit(edit_at_frame(edit, 5), "Set keys")
+    driver.session.steps.change_edit(edit_at_frame(edit, 5), "Set keys")
     return driver.scene.edit
 
 

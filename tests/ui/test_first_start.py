@@ -81,7 +81,7 @@ def test_what_is_asked_for_meanwhile_is_made_once_everything_is_compiled(empty_w
     monkeypatch.setattr("splap_editor.first_start.Compilation", lambda told: Compilation(told, command=obedient))
     shares, jobs = [], []
     session = empty_window.session
-    session.job_changed.connect(lambda job: jobs.append(job and (job.kind, job.title)))
+    session.told_job.changed.connect(lambda job: jobs.append(job and (job.kind, job.title)))
     try:
         open_first(empty_window, resource("samples", "tube.ply"), shares.append)
         assert not TwofoldLoop.uses_compiled and session.state == "opening"

@@ -10,6 +10,7 @@ from splap_editor.core.splats.splats import Splats
 from splap_editor.io.recipe import read_recipe
 from splap_editor.io.sample_maker import write_sample
 from splap_editor.session.cards import has_edge
+from splap_editor.session.edit_file import write_edit
 from splap_editor.session.mends import fragments
 from tests.core.splat_scenes import joined, sheet
 
@@ -28,7 +29,7 @@ def wait_remade(driver, surface) -> None:
 def select(driver, rows) -> None:
     mask = np.zeros(driver.scene.splats.n_splats, bool)
     mask[rows] = True
-    driver.session.change_mask("selection", mask, "Select")
+    driver.session.steps.change_mask("selection", mask, "Select")
 
 
 def halves(driver) -> tuple[np.ndarray, np.ndarray]:
@@ -130,7 +131,7 @@ def test_two_selections_are_cut_apart_and_joined_again_and_the_edit_keeps_it(dri
     wait_remade(driver, cut)
     assert scene.surface.graph.components.max() == 0
     path = tmp_path / "edit.json"
-    driver.session.save_edit(path)
+    write_edit(path, driver.scene)
     assert read_recipe(path).options[GraphOptions].cut == scene.edit.graph.cut
     actions["graph.clear_mends"].trigger()
     driver.qtbot.waitUntil(lambda: scene.surface.options == GraphOptions(), timeout=WAIT_MS)

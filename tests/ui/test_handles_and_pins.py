@@ -28,14 +28,14 @@ def at_ends(driver):
     """Handles at both ends of the tube."""
     centers = driver.scene.ellipses.centers
     for node in (np.argmin(centers[:, 0]), np.argmax(centers[:, 0])):
-        driver.session.add_handle(Region(centers[node], 0.1))
+        driver.session.steps.add_handle(Region(centers[node], 0.1))
     driver.wait_idle()
     return driver.scene.edit.handles
 
 
 def test_a_pin_is_listed_named_chosen_and_deleted(driver):
     panel = driver.window.handles_panel
-    first, second = pinned(driver), driver.session.add_pin(Region(driver.scene.ellipses.centers[0], 0.1))
+    first, second = pinned(driver), driver.session.steps.add_pin(Region(driver.scene.ellipses.centers[0], 0.1))
     assert list(panel.pin_rows) == [first.pin_id, second.pin_id]
     row = panel.pin_rows[first.pin_id]
     assert row.held.text() == f"{len(first.region.rows):,}"
@@ -157,7 +157,7 @@ def test_shift_and_the_right_button_place_the_pivot(driver):
 @pytest.mark.parametrize("method", ["arap", "bbw"])
 def test_nothing_below_the_list_jumps_when_handles_and_pins_appear(driver, method):
     window = driver.window
-    driver.session.change_edit(replace(driver.scene.edit, method=method), "Change method")
+    driver.session.steps.change_edit(replace(driver.scene.edit, method=method), "Change method")
     driver.wait_idle()
     below = [window.handles_panel.pose_form, window.deformer_panel.method, window.display_panel]
 
@@ -168,12 +168,12 @@ def test_nothing_below_the_list_jumps_when_handles_and_pins_appear(driver, metho
         return [part.mapTo(window.dock, QPoint(0, 0)).y() for part in below]
 
     before = places()
-    driver.session.add_handle(Region(driver.scene.ellipses.centers[0], 0.1))
+    driver.session.steps.add_handle(Region(driver.scene.ellipses.centers[0], 0.1))
     assert places() == before
-    driver.session.add_pin(rows_region(driver.scene, np.arange(50)))
+    driver.session.steps.add_pin(rows_region(driver.scene, np.arange(50)))
     assert places() == before
     driver.wait_idle()
     assert places() == before
-    driver.session.change_edit(driver.scene.edit.without_handles((1,)), "Delete handle")
+    driver.session.steps.change_edit(driver.scene.edit.without_handles((1,)), "Delete handle")
     driver.wait_idle()
     assert places() == before

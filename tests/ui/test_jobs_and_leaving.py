@@ -21,9 +21,9 @@ TUBE = resource("samples", "tube.ply")
 
 def bend(driver: Driver) -> None:
     """Place a handle and move it, as one who has work to lose."""
-    handle = driver.session.add_handle(Region(driver.scene.ellipses.centers[0], 0.1))
-    driver.session.preview_poses({handle.handle_id: Pose((0.0, 0.0, 0.1))})
-    driver.session.commit_preview("Move handle")
+    handle = driver.session.steps.add_handle(Region(driver.scene.ellipses.centers[0], 0.1))
+    driver.session.drag.preview({handle.handle_id: Pose((0.0, 0.0, 0.1))})
+    driver.session.drag.commit("Move handle")
     driver.wait_idle()
 
 
@@ -95,7 +95,7 @@ def test_closing_asks_before_an_edit_is_lost(driver, qtbot):
 def test_quitting_asks_before_handles_and_pins_are_lost(driver):
     quit_key = (Qt.Key.Key_Q, Qt.KeyboardModifier.ControlModifier)
     region = Region(driver.scene.ellipses.centers[0], 0.1)
-    for place in (driver.session.add_pin, driver.session.add_handle):
+    for place in (driver.session.steps.add_pin, driver.session.steps.add_handle):
         place(region)
         driver.wait_idle()
         assert driver.scene.edit.is_identity
@@ -163,9 +163,9 @@ def test_closing_while_a_job_runs_exits_with_0(tmp_path, moment):
         session = window.session
         def bend():
             if session.state == "ready":
-                handle = session.add_handle(Region(session.scene.ellipses.centers[0], 0.2))
-                session.preview_poses({{handle.handle_id: Pose((0.0, 0.0, 0.5))}})
-                session.commit_preview("Move")
+                handle = session.steps.add_handle(Region(session.scene.ellipses.centers[0], 0.2))
+                session.drag.preview({{handle.handle_id: Pose((0.0, 0.0, 0.5))}})
+                session.drag.commit("Move")
             elif session.state == "settling":
                 window.close()
         if {moment!r} == "opening":

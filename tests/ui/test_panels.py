@@ -87,7 +87,7 @@ def test_an_options_form_gives_a_changed_copy(qtbot):
 
 def test_handle_list_renames_switches_resets_and_deletes(driver):
     session, panel = driver.session, driver.window.handles_panel
-    session.add_handle(Region(driver.scene.ellipses.centers[0], 0.1), pose=Pose((0.0, 0.0, 0.1)))
+    session.steps.add_handle(Region(driver.scene.ellipses.centers[0], 0.1), pose=Pose((0.0, 0.0, 0.1)))
     row = panel.handle_rows[1]
     row.name.setText("Left end")
     row.name.editingFinished.emit()
@@ -106,7 +106,7 @@ def test_handle_list_renames_switches_resets_and_deletes(driver):
 
 
 def test_numbers_of_the_pose_move_the_handle(driver):
-    driver.session.add_handle(Region(driver.scene.ellipses.centers[0], 0.1))
+    driver.session.steps.add_handle(Region(driver.scene.ellipses.centers[0], 0.1))
     form = driver.window.handles_panel.pose_form
     form.translate[2].setValue(0.25)
     assert driver.scene.edit.handles[0].pose.translate == (0.0, 0.0, 0.25)
@@ -170,14 +170,14 @@ def cut_labels(window):
 
 def test_no_line_of_the_panels_is_cut_while_the_surface_is_prepared_again(driver):
     centers = driver.scene.ellipses.centers
-    driver.session.change_edit(replace(driver.scene.edit, method="bbw"), "Change method")
+    driver.session.steps.change_edit(replace(driver.scene.edit, method="bbw"), "Change method")
     for tip in (centers[:, 2].argmin(), centers[:, 2].argmax()):
-        driver.session.add_handle(Region(centers[tip], 0.1))
+        driver.session.steps.add_handle(Region(centers[tip], 0.1))
     driver.wait_idle()
     driver.window.deformer_panel.details.header.click()
     assert len(driver.window.deformer_panel.figures.text().splitlines()) == 4
     epsilon = replace(driver.scene.edit.graph, epsilon=0.01)
-    driver.session.change_edit(driver.scene.edit.with_options(epsilon), "Change gap")
+    driver.session.steps.change_edit(driver.scene.edit.with_options(epsilon), "Change gap")
     # A text, the room it needs and where that is found come in turn.
     for _ in range(5):
         QApplication.processEvents()

@@ -37,7 +37,7 @@ def test_no_widget_takes_a_hostile_name_for_a_document(driver, tmp_path):
     driver.open(path)
     driver.wait_idle()
     window = driver.window
-    window.session.add_handle(Region(driver.scene.ellipses.centers[0], 0.1), name=HOSTILE)
+    window.session.steps.add_handle(Region(driver.scene.ellipses.centers[0], 0.1), name=HOSTILE)
     window.toast.fail(f"{HOSTILE} cannot be read.")
     window.session.failed.emit(HOSTILE, ValueError(HOSTILE))
     QApplication.processEvents()

@@ -16,14 +16,14 @@ BENT = Pose((0.05, 0.0, 0.1), (0.8, 0.6, 0.0, 0.0))
 def end_handle(driver, axis=0, sign=1.0):
     """A handle at an end of the tube; the longest way is along X."""
     centers = driver.scene.ellipses.centers
-    handle = driver.session.add_handle(Region(centers[np.argmax(sign * centers[:, axis])], 0.1))
+    handle = driver.session.steps.add_handle(Region(centers[np.argmax(sign * centers[:, axis])], 0.1))
     driver.wait_idle()
     return handle
 
 
 def pose(driver, handle, to):
-    driver.session.preview_poses({handle.handle_id: to})
-    driver.session.commit_preview("Move handle")
+    driver.session.drag.preview({handle.handle_id: to})
+    driver.session.drag.commit("Move handle")
     driver.wait_idle()
 
 
@@ -68,7 +68,7 @@ def test_the_symmetry_of_the_object_is_looked_for_once(driver, qtbot):
 def test_a_selection_is_kept_by_name_and_selected_again(driver):
     mask = np.zeros(driver.scene.splats.n_splats, bool)
     mask[10:40] = True
-    driver.session.change_mask("selection", mask, "Select")
+    driver.session.steps.change_mask("selection", mask, "Select")
     menu = driver.window.selection_sets
     assert not menu.isEnabled()
     driver.window.actions_["sets.keep"].trigger()

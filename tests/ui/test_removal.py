@@ -7,7 +7,7 @@ from PySide6.QtCore import Qt
 def selected(driver, n=300):
     mask = np.zeros(driver.scene.splats.n_splats, bool)
     mask[:n] = True
-    driver.session.change_mask("selection", mask, "Select")
+    driver.session.steps.change_mask("selection", mask, "Select")
     return mask
 
 

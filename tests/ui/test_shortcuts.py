@@ -42,7 +42,7 @@ def test_no_two_entries_of_a_menu_share_a_mnemonic(empty_window):
 
 def test_show_all_and_reset_pose_answer_their_keys(driver):
     scene = driver.scene
-    driver.session.change_mask("hidden", np.arange(scene.splats.n_splats) < 50, "Hide")
+    driver.session.steps.change_mask("hidden", np.arange(scene.splats.n_splats) < 50, "Hide")
     driver.key(Qt.Key.Key_H, ALT)
     assert not scene.hidden.any()
     driver.click(driver.surface_pixel())

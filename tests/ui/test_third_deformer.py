@@ -29,7 +29,7 @@ def fade():
 def test_choosing_it_and_changing_its_option_bends_the_scene(fade, driver):
     window, scene = driver.window, driver.scene
     panel = window.findChild(DeformerPanel)
-    driver.session.add_handle(Region(np.array([1.1, 0.0, 0.3]), radius=0.1), pose=Pose(translate=(0.0, 0.0, 0.2)))
+    driver.session.steps.add_handle(Region(np.array([1.1, 0.0, 0.3]), radius=0.1), pose=Pose(translate=(0.0, 0.0, 0.2)))
     driver.wait_idle()
     panel.method.setCurrentIndex(panel.method.findData("fade"))
     assert scene.edit.method == "fade" and panel.forms[FadeOptions].isVisibleTo(panel)

@@ -24,7 +24,7 @@ LIFTED = Pose((0.0, 0.0, 0.2))
 
 def strip_of(driver) -> TimelineStrip:
     """The strip with a handle at rest in frame 1, nothing else set."""
-    driver.session.add_handle(Region(driver.scene.ellipses.centers[0], 0.1))
+    driver.session.steps.add_handle(Region(driver.scene.ellipses.centers[0], 0.1))
     driver.wait_idle()
     return driver.window.findChild(TimelineStrip)
 
@@ -41,8 +41,8 @@ def keyed_strip(driver) -> TimelineStrip:
 
 
 def pose(driver, to):
-    driver.session.preview_poses({driver.scene.edit.handles[0].handle_id: to})
-    driver.session.commit_preview("Move handle")
+    driver.session.drag.preview({driver.scene.edit.handles[0].handle_id: to})
+    driver.session.drag.commit("Move handle")
     driver.wait_idle()
 
 
@@ -172,10 +172,10 @@ def test_dragging_a_handle_stops_playing(driver, qtbot):
     driver.key(Qt.Key.Key_Space)
     player = driver.window.timeline_actions.player
     qtbot.waitUntil(lambda: driver.scene.preview is not None, timeout=WAIT_MS)
-    driver.session.preview_poses({driver.scene.edit.handles[0].handle_id: Pose((0.3, 0.0, 0.0))})
+    driver.session.drag.preview({driver.scene.edit.handles[0].handle_id: Pose((0.3, 0.0, 0.0))})
     qtbot.waitUntil(lambda: not player.is_playing, timeout=WAIT_MS)
     assert driver.scene.preview.handles[0].pose.translate == (0.3, 0.0, 0.0)
-    driver.session.cancel_preview()
+    driver.session.drag.cancel()
     driver.wait_idle()
 
 

@@ -12,6 +12,7 @@ from splap_editor.engine.edit import Pose
 from splap_editor.engine.quantities import splat_weights
 from splap_editor.io.ply import read_ply
 from splap_editor.resources import resource
+from splap_editor.session.edit_file import write_edit
 from splap_editor.session.placement import disc_rows, rows_region
 from splap_editor.ui.widgets.number_field import ScrubLabel
 from splap_editor.viewport.weight_colors import BAND_COLORS, REST_COLOR, weight_tints
@@ -31,7 +32,7 @@ def regions(scene, shares):
 def placed(driver, shares=(0.1, 0.9), method=1):
     """Choose weights in the panel and place handles along the tube."""
     driver.window.deformer_panel.method.setCurrentIndex(method)
-    handles = [driver.session.add_handle(region) for region in regions(driver.scene, shares)]
+    handles = [driver.session.steps.add_handle(region) for region in regions(driver.scene, shares)]
     driver.wait_idle()
     return handles
 
@@ -148,7 +149,7 @@ def test_the_panel_says_how_good_the_weights_are_and_what_they_do_not_reach(driv
     panel.details.header.click()
     assert panel.figures.isVisible() and panel.timing.text().startswith("Drawing: ")
     row = int(driver.scene.ellipses.rows[0])
-    driver.session.add_handle(rows_region(driver.scene, disc_rows(driver.scene, row, 0.0)))
+    driver.session.steps.add_handle(rows_region(driver.scene, disc_rows(driver.scene, row, 0.0)))
     driver.window.handles_panel.cage_form.radius.setValue(1e-6)
     driver.wait_idle()
     (line,) = panel.weights.lines
@@ -157,7 +158,7 @@ def test_the_panel_says_how_good_the_weights_are_and_what_they_do_not_reach(driv
 
 def test_progress_names_the_handle(driver):
     stages = []
-    driver.session.job_changed.connect(lambda job: stages.append(job.stage) if job is not None else None)
+    driver.session.told_job.changed.connect(lambda job: stages.append(job.stage) if job is not None else None)
     placed(driver, shares=(0.1, 0.5, 0.9))
     named = [stage for stage in stages if stage.startswith("weights: handle ")]
     assert named and all(" of " in stage and stage.endswith(" %") for stage in named)
@@ -165,10 +166,10 @@ def test_progress_names_the_handle(driver):
 
 def test_the_same_recipe_gives_the_same_splats_from_window_and_command_line(driver, tmp_path):
     handles = placed(driver)
-    driver.session.preview_poses({handles[1].handle_id: Pose((0.0, 0.3, 0.1), (0.9, 0.1, 0.3, 0.3), 1.2)})
-    driver.session.commit_preview("Move handle")
+    driver.session.drag.preview({handles[1].handle_id: Pose((0.0, 0.3, 0.1), (0.9, 0.1, 0.3, 0.3), 1.2)})
+    driver.session.drag.commit("Move handle")
     driver.wait_idle()
-    driver.session.save_edit(tmp_path / "edit.json")
+    write_edit(tmp_path / "edit.json", driver.scene)
     with driver.qtbot.waitCallback() as written:
         driver.session.exported.connect(written)
         driver.session.export(tmp_path / "window.ply")

@@ -8,13 +8,12 @@ from splap_editor.viewport.frame_pacer import FramePacer
 
 
 class Drag:
-    """A session's frames: one on its way or none."""
+    """Frames of a drag: one on its way or none."""
 
     def __init__(self):
-        self.state_changed = Signal()
         self.awaits_frame = False
 
-    def pace_frames(self, gate):
+    def pace(self, gate):
         self.gate = gate
 
 
@@ -23,7 +22,8 @@ def paced(monkeypatch, *, is_seen=True):
     clock = SimpleNamespace(now=100.0)
     monkeypatch.setattr(frame_pacer, "perf_counter", lambda: clock.now)
     drag, frames = Drag(), []
-    return FramePacer(drag, lambda: frames.append(clock.now), lambda: is_seen), drag, frames, clock
+    session = SimpleNamespace(drag=drag, state_changed=Signal())
+    return FramePacer(session, lambda: frames.append(clock.now), lambda: is_seen), drag, frames, clock
 
 
 def test_a_frame_waits_for_the_pose_on_its_way_but_not_for_long(monkeypatch):

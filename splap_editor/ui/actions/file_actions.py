@@ -15,6 +15,7 @@ from splap_editor.io.splat_files import name_filter
 from splap_editor.resources import resource
 from splap_editor.session.bound_edit import column_lacks
 from splap_editor.session.documents import Documents
+from splap_editor.session.edit_file import read_edit, write_edit
 from splap_editor.session.session import Session
 from splap_editor.ui.dialogs.export_dialog import ExportDialog
 from splap_editor.ui.dialogs.picture_dialog import PictureDialog
@@ -93,7 +94,7 @@ class FileActions:
 
     def _read_edit(self, path: Path) -> None:
         try:
-            self._session.open_edit(path)
+            self._session.steps.change_edit(read_edit(path, self._session.shown_scene), "Open edit")
         except (OSError, ValueError, RuntimeError) as error:
             self._toast.fail(f"{path.name} was not opened: {sentence(error)}")
         else:
@@ -125,7 +126,7 @@ class FileActions:
 
     def _write_edit(self, path: Path) -> None:
         try:
-            self._session.save_edit(path)
+            write_edit(path, self._session.shown_scene)
         except (OSError, ValueError) as error:
             self._toast.fail(f"The edit was not exported: {sentence(error)}")
         else:

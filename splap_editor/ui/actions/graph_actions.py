@@ -65,7 +65,7 @@ class GraphActions:
     def take_preset(self, name: str = "paper") -> None:
         """Set the options that a preset names, for graph, deformers and splats alike."""
         edit = self._session.shown_scene.edit
-        self._session.change_edit(replace(edit, options=with_preset(edit.options, name)), PRESETS[name].label)
+        self._session.steps.change_edit(replace(edit, options=with_preset(edit.options, name)), PRESETS[name].label)
         self._say(PRESETS[name].sentence)
 
     # Mends --------------------------------------------------------------------------------------------------------
@@ -143,7 +143,7 @@ class GraphActions:
         self._change(with_cut(self._options, pairs), label)
 
     def _change(self, options: GraphOptions, label: str) -> None:
-        self._session.change_edit(self._session.shown_scene.edit.with_options(options), label)
+        self._session.steps.change_edit(self._session.shown_scene.edit.with_options(options), label)
 
     def _forget(self) -> None:
         self.kept = None

@@ -20,20 +20,20 @@ class HandleActions:
 
     def from_selection(self) -> None:
         """Make the selected splats a handle."""
-        self._session.add_handle(self._selected_region())
+        self._session.steps.add_handle(self._selected_region())
 
     def pin_selection(self) -> None:
         """Hold the selected splats where they are."""
-        self._session.add_pin(self._selected_region())
+        self._session.steps.add_pin(self._selected_region())
 
     def pin_rest(self) -> None:
         """Hold all that is not selected, as one pin; of what handles hold, these stay the masters."""
         scene = self._session.shown_scene
-        self._session.add_pin(rows_region(scene, np.flatnonzero(~scene.selection)))
+        self._session.steps.add_pin(rows_region(scene, np.flatnonzero(~scene.selection)))
 
     def clear_pins(self) -> None:
         """Let go of all pins."""
-        self._session.change_edit(replace(self._session.shown_scene.edit, pins=()), "Clear pins")
+        self._session.steps.change_edit(replace(self._session.shown_scene.edit, pins=()), "Clear pins")
 
     def reset(self) -> None:
         """Put the chosen handles back to rest."""
@@ -51,7 +51,7 @@ class HandleActions:
         handles, pins = scene.active_handles, scene.active_pins
         counts = ((len(handles), "handle"), (len(pins), "pin"))
         what = " and ".join(f"{n} {noun}s" if n > 1 else noun for n, noun in counts if n)
-        self._session.change_edit(scene.edit.without_handles(handles).without_pins(pins), f"Delete {what}")
+        self._session.steps.change_edit(scene.edit.without_handles(handles).without_pins(pins), f"Delete {what}")
 
     def pivot(self, pivot: Pivot) -> None:
         """Choose what handles turn and scale about."""
@@ -70,7 +70,7 @@ class HandleActions:
     def _reset(self, handle_ids: tuple[int, ...], label: str) -> None:
         edit = self._session.shown_scene.edit
         if any(not edit.handle(handle_id).pose.is_identity for handle_id in handle_ids):
-            self._session.change_edit(edit.with_poses(dict.fromkeys(handle_ids, Pose())), label)
+            self._session.steps.change_edit(edit.with_poses(dict.fromkeys(handle_ids, Pose())), label)
 
     def _selected_region(self):
         scene = self._session.shown_scene

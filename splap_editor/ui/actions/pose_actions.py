@@ -39,7 +39,7 @@ class PoseActions:
         """Give the chosen handles the poses copied last."""
         scene = self._session.shown_scene
         if self._copied:
-            self._session.change_edit(pasted_poses(scene.edit, scene.active_handles, self._copied), "Paste pose")
+            self._session.steps.change_edit(pasted_poses(scene.edit, scene.active_handles, self._copied), "Paste pose")
         else:
             self._toast.say("No pose was copied yet: choose a handle and press Ctrl+C.")
 
@@ -85,7 +85,7 @@ class PoseActions:
         except NoMirrorImageError as error:
             self._toast.fail(f"The handle was not mirrored: {error}.")
             return
-        self._session.change_edit(edit, "Mirror handle")
+        self._session.steps.change_edit(edit, "Mirror handle")
         scene.set_active_handles(counterparts)
 
     def _on_scene_changed(self) -> None:

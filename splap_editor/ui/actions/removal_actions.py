@@ -63,7 +63,7 @@ class RemovalActions:
     def _change(self, removal: Removal, label: str) -> None:
         before = self._scene.edit.removal.n_removed
         try:
-            n = self._session.change_removal(removal, label)
+            n = self._session.steps.change_removal(removal, label)
         except ValueError as error:
             self._toast.fail(f"Nothing was removed: {error}.")
             return

@@ -66,7 +66,7 @@ class SelectActions:
         self._options.set(replace(self._options.value, through=on))
 
     def _select(self, mask: np.ndarray, label: str) -> None:
-        self._session.change_mask("selection", mask, label)
+        self._session.steps.change_mask("selection", mask, label)
 
     def _hide(self, mask: np.ndarray, label: str) -> None:
-        self._session.change_mask("hidden", mask, label)
+        self._session.steps.change_mask("hidden", mask, label)

@@ -43,7 +43,9 @@ class SelectionSetsMenu(QMenu):
 
     def select(self, name: str) -> None:
         """Select what was kept under a name."""
-        self._session.change_mask("selection", self._session.shown_scene.selection_sets[name].copy(), f"Select {name}")
+        self._session.steps.change_mask(
+            "selection", self._session.shown_scene.selection_sets[name].copy(), f"Select {name}"
+        )
 
     def forget(self, name: str) -> None:
         """Keep it no longer."""

@@ -105,7 +105,7 @@ class TimelineActions(QObject):
     def set_key(self) -> None:
         """Keep the poses of all handles at the frame shown."""
         self.player.stop()
-        self._session.change_edit(keyed_edit(self._edit), "Set key")
+        self._session.steps.change_edit(keyed_edit(self._edit), "Set key")
 
     def delete_key(self) -> None:
         """Delete the key at the frame shown."""
@@ -156,7 +156,7 @@ class TimelineActions(QObject):
         """Take a changed timeline, and show the frame as it is now."""
         self.player.stop()
         edit = replace(self._edit, timeline=timeline)
-        self._session.change_edit(edit_at_frame(edit, timeline.frame) if timeline.keys else edit, label)
+        self._session.steps.change_edit(edit_at_frame(edit, timeline.frame) if timeline.keys else edit, label)
 
     def _show_if_keyed(self) -> None:
         if self._edit.timeline.keys and not self._is_shown:

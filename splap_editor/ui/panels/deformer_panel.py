@@ -169,8 +169,8 @@ class DeformerPanel(QWidget):
 
     def _take(self, group: object, what: str) -> None:
         if self._scene is not None:
-            self._session.change_edit(self._scene.edit.with_options(group), f"Change {what.lower()}")
+            self._session.steps.change_edit(self._scene.edit.with_options(group), f"Change {what.lower()}")
 
     def _change(self, label: str, **values: Any) -> None:
         if self._scene is not None:
-            self._session.change_edit(replace(self._scene.edit, **values), label)
+            self._session.steps.change_edit(replace(self._scene.edit, **values), label)

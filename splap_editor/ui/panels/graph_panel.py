@@ -217,7 +217,7 @@ class GraphPanel(QWidget):
 
     def _on_applied(self) -> None:
         options, self._wanted = self._wanted_options(), None
-        self._session.change_edit(self._session.shown_scene.edit.with_options(options), "Change graph")
+        self._session.steps.change_edit(self._session.shown_scene.edit.with_options(options), "Change graph")
 
     def _on_reverted(self) -> None:
         self._wanted = None

@@ -219,25 +219,25 @@ class HandlesPanel(QWidget):
         edit = self._session.shown_scene.edit
         handle = edit.handle(handle_id)
         if any(getattr(handle, name) != value for name, value in values.items()):
-            self._session.change_edit(edit.with_handle(replace(handle, **values)), label)
+            self._session.steps.change_edit(edit.with_handle(replace(handle, **values)), label)
 
     def change_pin(self, pin_id: int, label: str, **values: Any) -> None:
         """Change fields of a pin as one undoable step."""
         edit = self._session.shown_scene.edit
         pin = edit.pin(pin_id)
         if any(getattr(pin, name) != value for name, value in values.items()):
-            self._session.change_edit(edit.with_pin(replace(pin, **values)), label)
+            self._session.steps.change_edit(edit.with_pin(replace(pin, **values)), label)
 
     def delete_handle(self, handle_id: int) -> None:
         """Delete a handle as one undoable step."""
-        self._session.change_edit(self._session.shown_scene.edit.without_handles((handle_id,)), "Delete handle")
+        self._session.steps.change_edit(self._session.shown_scene.edit.without_handles((handle_id,)), "Delete handle")
 
     def delete_pin(self, pin_id: int) -> None:
         """Delete a pin as one undoable step."""
-        self._session.change_edit(self._session.shown_scene.edit.without_pins((pin_id,)), "Delete pin")
+        self._session.steps.change_edit(self._session.shown_scene.edit.without_pins((pin_id,)), "Delete pin")
 
     def _preview(self, pose: Pose) -> None:
-        self._session.preview_poses({self._session.shown_scene.active_handles[-1]: pose})
+        self._session.drag.preview({self._session.shown_scene.active_handles[-1]: pose})
 
     def _on_pose_changed(self, pose: Pose) -> None:
         handle = self._chosen()
@@ -245,7 +245,7 @@ class HandlesPanel(QWidget):
             return
         if self._session.shown_scene.preview is not None:
             self._preview(pose)
-            self._session.commit_preview("Pose handle")
+            self._session.drag.commit("Pose handle")
         else:
             self.change_handle(handle.handle_id, "Pose handle", pose=pose)
 
@@ -259,4 +259,4 @@ class HandlesPanel(QWidget):
         if pin is not None and pin.reach is not None and reach != pin.reach:
             scene = self._session.shown_scene
             edit = scene.edit.with_pin(pin_with_reach(scene, pin, reach))
-            self._session.change_edit(edit, "Change reach of pin")
+            self._session.steps.change_edit(edit, "Change reach of pin")

@@ -71,4 +71,4 @@ class OdditiesList(QWidget):
         if self._session.scene is scene:
             mask = np.zeros(scene.splats.n_splats, bool)
             mask[oddity.rows] = True
-            self._session.change_mask("selection", mask, "Select odd splats")
+            self._session.steps.change_mask("selection", mask, "Select odd splats")

@@ -128,7 +128,7 @@ class QuantityPanel(QWidget):
         before = self._session.shown_scene.selection if self._before is None else self._before
         selection = self._combined(before, low, high, mode)
         self._drop()
-        self._session.change_mask("selection", selection, "Select by value")
+        self._session.steps.change_mask("selection", selection, "Select by value")
 
     def _drop(self) -> None:
         if self._before is not None:

@@ -53,7 +53,7 @@ class JobBar(QWidget):
         layout.addStretch(1)
         self._delay = QTimer(self, singleShot=True, interval=SHOW_AFTER_MS)
         self._delay.timeout.connect(self._show)
-        session.job_changed.connect(self._on_job_changed)
+        session.told_job.changed.connect(self._on_job_changed)
         session.state_changed.connect(self._on_state_changed)
         self._hide()
 

@@ -1,0 +1,93 @@
+"""What a person changes in a scene, each as one step that can be undone."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from splap_editor.core.handle_nodes import Region
+from splap_editor.core.index_spaces import FileMask
+from splap_editor.core.pose import Pose
+from splap_editor.engine.edit import HANDLE_COLORS, Edit, Handle, Pin
+from splap_editor.engine.keyframes import auto_keyed_edit
+from splap_editor.engine.removal import Removal
+from splap_editor.session.commands import ChangeEdit, ChangeMask, ChangeTogether
+from splap_editor.session.history import History
+from splap_editor.session.stages import Ledger
+
+
+class UndoSteps:
+    """Changes the edit and the masks of the scene on screen through its history.
+
+    Parameters
+    ----------
+    ledger : Ledger
+        Says which scene is on screen.
+    history : History
+    """
+
+    def __init__(self, ledger: Ledger, history: History) -> None:
+        self._ledger = ledger
+        self._history = history
+
+    def change_edit(self, edit: Edit, label: str) -> None:
+        """Replace the edit."""
+        scene = self._ledger.shown_scene
+        self._history.push(ChangeEdit(scene, scene.edit, auto_keyed_edit(scene.edit, edit), label))
+
+    def change_mask(self, name: str, mask: FileMask, label: str) -> None:
+        """Replace ``"selection"`` or ``"hidden"``, (N,) of file rows; no step if nothing changes.
+
+        What is removed is not selected unless it is shown.
+        """
+        scene = self._ledger.shown_scene
+        if name == "selection" and scene.edit.removed is not None and not scene.shows_removed:
+            mask = mask & ~scene.removed
+        if not np.array_equal(getattr(scene, name), mask):
+            self._history.push(ChangeMask(scene, name, mask, label))
+
+    def change_removal(self, removal: Removal, label: str) -> int:
+        """Leave other splats out; the step also selects what comes back, and else what stays selected.
+
+        Returns
+        -------
+        int
+            How many splats changed; without any there is no step.
+
+        Raises
+        ------
+        ValueError
+            Every splat would be left out.
+        """
+        scene = self._ledger.shown_scene
+        before = scene.removed
+        after = np.zeros_like(before) if removal.mask is None else removal.mask
+        changed = int(np.count_nonzero(before ^ after))
+        if not changed:
+            return 0
+        if after.all():
+            raise ValueError("that would remove every splat: keep at least one")
+        back = before & ~after
+        selection = back if back.any() else scene.selection & ~after
+        edit = auto_keyed_edit(scene.edit, replace(scene.edit, removal=removal))
+        commands = ChangeEdit(scene, scene.edit, edit, label), ChangeMask(scene, "selection", selection, label)
+        self._history.push(ChangeTogether(commands, label))
+        return changed
+
+    def add_handle(self, region: Region, *, pose: Pose | None = None, name: str | None = None) -> Handle:
+        """Place a handle, make it the active one, and prepare to move it, even if work was halted."""
+        scene = self._ledger.shown_scene
+        handle_id = scene.edit.next_handle_id()
+        color = HANDLE_COLORS[(handle_id - 1) % len(HANDLE_COLORS)]
+        handle = Handle(handle_id, name or f"Handle {handle_id}", color, region, pose or Pose())
+        self._ledger.is_halted = False
+        self.change_edit(scene.edit.with_handle(handle), "Place handle")
+        scene.set_active_handles((handle_id,))
+        return handle
+
+    def add_pin(self, region: Region, *, reach: float | None = None) -> Pin:
+        """Hold splats where they are; ``reach``: the region is a disc on the surface of this radius."""
+        edit = self._ledger.shown_scene.edit
+        pin_id = edit.next_pin_id()
+        pin = Pin(pin_id, f"Pin {pin_id}", region, reach)
+        self.change_edit(edit.with_pin(pin), "Place pin")
+        return pin
