@@ -67,12 +67,17 @@ def stroke_mends(
 
 
 def joint_contacts(ellipses: Ellipses, graph: SplatGraph, joint: Joint) -> Nodes:
-    """(P, 2) nodes by which the two rims of a joint are best tied; a node near both belongs to the nearer part."""
+    """(P, 2) nodes by which the two rims of a joint are best tied, and are not yet.
+
+    A node near both belongs to the nearer part.
+    """
     apart = [
         geodesic_distances(graph, nodes_at(ellipses, part), limit=RIM * joint.reach) for part in (joint.a, joint.b)
     ]
     first, second = np.flatnonzero(apart[0] < apart[1]), np.flatnonzero(apart[1] < apart[0])
-    return best_contacts(ellipses, first, second, graph.epsilon, reach=joint.reach)
+    contacts = best_contacts(ellipses, first, second, graph.epsilon, reach=joint.reach)
+    are_joined = [j in graph.indices[graph.indptr[i] : graph.indptr[i + 1]] for i, j in contacts]
+    return contacts[~np.array(are_joined, bool)]
 
 
 def nodes_at(ellipses: Ellipses, points: Iterable[Point]) -> Nodes:

@@ -8,6 +8,7 @@ from splap_editor.tools.brush_tool import BrushTool
 from splap_editor.tools.click_tool import ClickTool
 from splap_editor.tools.handle_tool import HandleTool
 from splap_editor.tools.inspect_tool import InspectTool
+from splap_editor.tools.join_tool import JoinTool
 from splap_editor.tools.lasso_tool import LassoTool
 from splap_editor.tools.navigate_tool import NavigateTool
 from splap_editor.tools.pin_tool import PinTool
@@ -60,6 +61,7 @@ TOOLS: tuple[ToolEntry, ...] = (
     ToolEntry(HandleTool, "&Handle", "W", "Click the surface to place a handle.", "Place handles and pins"),
     ToolEntry(PinTool, "&Pin", "E", "Click the surface to hold it in place.", "Place handles and pins"),
     ToolEntry(SeparateTool, "&Separate", "", "Draw over two parts to take them apart.", "Mend the surface"),
+    ToolEntry(JoinTool, "&Join", "", "Draw across a gap to tie its two rims together.", "Mend the surface"),
     ToolEntry(InspectTool, "&Inspect", "I", "See a splat's card and neighbours, or an edge's.", "Inspect"),
 )
 

@@ -82,6 +82,19 @@ class Hand:
         return self.scene.edit.handles[-1]
 
 
+def two_places(hand) -> tuple[np.ndarray, np.ndarray]:
+    """Two pixels far apart with splats under them."""
+    screen = hand.viewport.screen_points()[:, :2]
+    near = hand.surface()
+    order = np.argsort(-np.linalg.norm(screen - near, axis=1))
+    width, height = hand.viewport.projection.width, hand.viewport.projection.height
+    for xy in screen[order]:
+        inside = 0 <= xy[0] < width and 0 <= xy[1] < height
+        if inside and hand.viewport.pick(*xy) is not None:
+            return near, xy
+    raise AssertionError("no second splat is in the picture")
+
+
 @pytest.fixture(scope="session")
 def stages(tmp_path_factory) -> StageCache:
     """Prepare the tube once for all tests."""

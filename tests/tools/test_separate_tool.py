@@ -2,18 +2,7 @@
 
 import numpy as np
 
-
-def two_places(hand) -> tuple[np.ndarray, np.ndarray]:
-    """Two pixels far apart with splats under them."""
-    screen = hand.viewport.screen_points()[:, :2]
-    near = hand.surface()
-    order = np.argsort(-np.linalg.norm(screen - near, axis=1))
-    width, height = hand.viewport.projection.width, hand.viewport.projection.height
-    for xy in screen[order]:
-        inside = 0 <= xy[0] < width and 0 <= xy[1] < height
-        if inside and hand.viewport.pick(*xy) is not None:
-            return near, xy
-    raise AssertionError("no second splat is in the picture")
+from tests.tools.conftest import two_places
 
 
 def pointed(hand):
@@ -23,14 +12,14 @@ def pointed(hand):
     for xy in two_places(hand):
         hand.click(xy)
     tool = hand.tools.chosen
-    hand.main.run_until(lambda: tool.seam is not None)
+    hand.main.run_until(lambda: tool.found is not None)
     return tool
 
 
 def test_two_clicks_show_a_seam_and_return_cuts_it_in_one_step(hand):
     tool = pointed(hand)
-    assert len(tool.seam.rows) and "Seam" in hand.context.hud.text
-    seam, before = tool.seam, hand.scene.surface.graph.n_edges
+    assert len(tool.found.rows) and "Seam" in hand.context.hud.text
+    seam, before = tool.found, hand.scene.surface.graph.n_edges
     hand.key("Return")
     assert hand.scene.edit.graph.separate == (seam.stroke,) and not tool.parts
     hand.settle()
@@ -43,15 +32,15 @@ def test_two_clicks_show_a_seam_and_return_cuts_it_in_one_step(hand):
 def test_escape_drops_the_seam(hand):
     tool = pointed(hand)
     hand.key("Esc")
-    assert not tool.parts and tool.seam is None and not hand.context.hud.text
+    assert not tool.parts and tool.found is None and not hand.context.hud.text
     assert not hand.scene.edit.graph.separate
 
 
 def test_a_bracket_asks_for_a_wider_seam(hand):
     tool = pointed(hand)
     hand.key("]")
-    hand.main.run_until(lambda: tool.seam is not None)
-    assert tool.seam.stroke.wider == 1
+    hand.main.run_until(lambda: tool.found is not None)
+    assert tool.found.stroke.wider == 1
 
 
 def test_a_stroke_keeps_places_at_rest(hand):

@@ -178,6 +178,7 @@ def tool_state(driver):
         (context.hud.text, context.held(HandleOptions).value, context.held(PinOptions).value),
         (context.held(BrushOptions).value, context.inspected.edge, driver.scene.picked),
         (window_tool(driver, "separate").parts, window_tool(driver, "separate").wider),
+        (window_tool(driver, "join").parts, window_tool(driver, "join").steps),
     )
 
 
@@ -197,10 +198,10 @@ def ready_for(driver, name, row, text):
         pair = int(rows[0]), int(rows[graph.indices[0]])
         context.inspected.pick(pair[0])
         context.inspected.pick_edge(pair)
-    elif name == "separate" and text in ("Return", "Enter"):
-        # With nothing pointed at, it parts the selection from the rest.
+    elif name in ("separate", "join") and text in ("Return", "Enter"):
+        # With nothing pointed at, it is about the selection and the rest.
         driver.scene.set_selection(driver.scene.splats.means[:, 0] > 0.0)
-    elif name == "separate":
+    elif name in ("separate", "join"):
         at, ratio = driver.surface_pixel(), driver.window.viewport.devicePixelRatioF()
         for _ in range(2):
             window_tool(driver, name).take_part([(at.x() * ratio, at.y() * ratio)])

@@ -7,6 +7,9 @@ from scipy.spatial import cKDTree
 from splap_editor.core.graph.ellipse_offset import touch_scales
 from splap_editor.core.splats.occupancy import Ellipses
 
+RIM_DEPTH = 4.0
+"""A rim is as deep as so many times the reach of the splats that face each other."""
+
 N_CANDIDATES = 12
 """Nearest centres on the other side among which a splat looks for its best contact."""
 
@@ -54,6 +57,35 @@ def best_contacts(
     best_of_first, best_of_second = (np.unique(pairs[:, side], return_index=True)[1] for side in (0, 1))
     chosen = np.intersect1d(best_of_first, best_of_second)
     return pairs[np.union1d(chosen, [0]) if len(pairs) else chosen]
+
+
+def facing_rims(
+    ellipses: Ellipses, first: NDArray[np.integer], second: NDArray[np.integer]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Nodes of two sets that face each other across the gap between them.
+
+    Parameters
+    ----------
+    ellipses : Ellipses
+    first, second : (A,), (B,) int
+        Nodes; at least one each, none of both.
+
+    Returns
+    -------
+    (a,), (b,) int64
+        Those hardly farther from the other set than the nearest ones are, ascending.
+    """
+    swapped = len(first) > len(second)
+    few, many = (second, first) if swapped else (first, second)
+    # Trees that are asked once need not be good ones.
+    apart, near = cKDTree(ellipses.centers[many], balanced_tree=False, compact_nodes=False).query(ellipses.centers[few])
+    nearest = int(np.argmin(apart))
+    depth = RIM_DEPTH * float(ellipses.reaches[[few[nearest], many[near[nearest]]]].max())
+    few = few[apart <= apart[nearest] + depth]
+    tree = cKDTree(ellipses.centers[few])
+    apart = tree.query(ellipses.centers[many], distance_upper_bound=float(apart[nearest]) + depth)[0]
+    rims = np.unique(few).astype(np.int64), np.unique(many[np.isfinite(apart)]).astype(np.int64)
+    return (rims[1], rims[0]) if swapped else rims
 
 
 def near_pairs(ellipses: Ellipses, a: NDArray[np.integer], b: NDArray[np.integer]) -> NDArray[np.int64]:
