@@ -164,7 +164,7 @@ def contribution(snapshot: Snapshot) -> NDArray[np.float64]:
     values = np.zeros(snapshot.splats.n_splats)
     total = weights.sum()
     if total > 0.0:
-        values[snapshot.ellipses.rows] = weights * (len(weights) / total)
+        values[_visible(snapshot).rows] = weights * (len(weights) / total)
     return values
 
 
@@ -172,10 +172,16 @@ def contributions_of(snapshot: Snapshot) -> Contributions:
     """What the active splats contribute, made once per scene: no pose changes it."""
     from splap_editor.core.splats.contributions import contributions
 
-    known = _CONTRIBUTIONS.get(snapshot.ellipses)
+    visible = _visible(snapshot)
+    known = _CONTRIBUTIONS.get(visible)
     if known is None:
-        known = _CONTRIBUTIONS[snapshot.ellipses] = contributions(snapshot.splats, snapshot.ellipses)
+        known = _CONTRIBUTIONS[visible] = contributions(snapshot.splats, visible)
     return known
+
+
+def _visible(snapshot: Snapshot) -> Ellipses:
+    """Ellipses of all active splats, whichever the surface is made of."""
+    return snapshot.ellipses if snapshot.surface is None else snapshot.surface.visible
 
 
 _CONTRIBUTIONS: WeakKeyDictionary[Ellipses, Contributions] = WeakKeyDictionary()
@@ -238,7 +244,9 @@ def principal_stretches(snapshot: Snapshot) -> NDArray[np.float64]:
     (N, 2) float64
         Largest and smallest; 1 where nothing moved, NaN for inert splats.
     """
-    ellipses, kernels = snapshot.ellipses, snapshot.kernels
+    kernels = snapshot.kernels
+    # While another surface is new, the pose shown is still one of the last.
+    ellipses = snapshot.ellipses if kernels is None else kernels.binding.ellipses
     n = ellipses.n_nodes
     stretches = np.ones((n, 2))
     if kernels is not None:

@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from splap_editor.core.adaptation.kernel_binding import KernelBinding
+from splap_editor.core.graph.carriers import carrying
 from splap_editor.core.graph.options import GRAPH_RULES, LAPLACIANS, NEIGHBORHOODS, GraphOptions
 from splap_editor.core.graph.splat_graph import SplatGraph, require_mendable
 from splap_editor.core.index_spaces import FileMask, RowPair
@@ -40,6 +41,9 @@ class Surface:
     Parameters
     ----------
     ellipses : Ellipses
+        Of the carriers, the nodes of everything below.
+    visible : Ellipses
+        Of all active splats.
     stages : SurfaceStages
         Graph, geodesics, Laplacian.
     binding : KernelBinding
@@ -53,6 +57,7 @@ class Surface:
     """
 
     ellipses: Ellipses
+    visible: Ellipses
     stages: SurfaceStages
     binding: KernelBinding
     key: str
@@ -125,7 +130,7 @@ def surface_of(
     splats : Splats
     options : GraphOptions
     ellipses : Ellipses, optional
-        The scene's occupancy ellipses where they are at hand.
+        Those of all active splats of the scene, where they are at hand.
     removed : (N,) bool, optional
         Splats that are left out, where the ellipses are not at hand. Cut and added edges of theirs are passed over.
     cache : StageCache, optional
@@ -157,8 +162,13 @@ def surface_of(
             "deform; check the layout it was read with"
         )
     asked, options = options, _without_removed(options, ellipses)
-    require_mendable(ellipses, options)
+    visible = ellipses
     plain = unmended(options)
+    if near is not None and near.visible is visible and near.options.carriers == options.carriers:
+        ellipses = near.ellipses
+    else:
+        ellipses = carrying(visible, options.carriers)
+    require_mendable(ellipses, options)
     # Tolerances are in units of the scene's size, which opacities have a say in too.
     made_from = (ellipses.centers, ellipses.semi_axes, ellipses.rows, ellipses.scene_scale)
     key = content_key((_made_by(plain), *made_from, plain))
@@ -177,7 +187,7 @@ def surface_of(
         key = content_key((key, options))
     with timed("kernels"):
         binding = KernelBinding(splats, ellipses, made.neighborhoods, graph=made.graph, progress=stages("kernels"))
-    return Surface(ellipses, made, binding, key, asked, timings)
+    return Surface(ellipses, visible, made, binding, key, asked, timings)
 
 
 def _without_removed(options: GraphOptions, ellipses: Ellipses) -> GraphOptions:

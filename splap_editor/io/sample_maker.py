@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.splats.splats import Splats
-from splap_editor.io.sample_placement import even_points, fitted_axes, random_tangents, tilted_normals
+from splap_editor.io.sample_placement import even_points, fitted_axes, random_points, random_tangents, tilted_normals
 from splap_editor.io.sample_shapes import SHAPES, Surface
 
 _SH0 = 0.28209479177387814
@@ -45,6 +45,16 @@ class SplatStyle:
         5th, 50th and 95th percentile.
     sh_degree : int
         Degree of the colour coefficients, 0 to 3.
+    thickness, thickness_spread : float
+        Median ratio of the smallest to the middle scale, at most 1, and standard deviation of its logarithm; 0 makes
+        splats of two scales.
+    haze, haze_reach : float
+        Share of the splats that are haze: faint, turned any way, standing off the surface by a half-normal of this
+        standard deviation in world units, on both sides of a sheet.
+    haze_opacities : tuple of float
+        Between these the opacities of haze lie, evenly in their logarithm.
+    floaters : float
+        Share of the splats that float about the object, within twice its size.
     """
 
     coverage: float = 2.0
@@ -57,6 +67,12 @@ class SplatStyle:
     depth: float = 0.0
     opacities: tuple[float, float, float] = (0.8, 0.97, 0.999)
     sh_degree: int = 1
+    thickness: float = 0.0
+    thickness_spread: float = 0.9
+    haze: float = 0.0
+    haze_reach: float = 0.03
+    haze_opacities: tuple[float, float] = (0.006, 0.1)
+    floaters: float = 0.0
 
     def __post_init__(self) -> None:
         if not 0 <= self.jitter <= 1:
@@ -65,6 +81,12 @@ class SplatStyle:
             raise ValueError("coverage must be positive, overhang at least 0 and aspect at least 1")
         if not 0 < self.opacities[0] <= self.opacities[1] <= self.opacities[2] < 1:
             raise ValueError(f"opacities must rise strictly between 0 and 1, got {self.opacities}")
+        if not 0 <= self.thickness <= 1:
+            raise ValueError(f"thickness must lie between 0 and 1, got {self.thickness}")
+        if self.haze < 0 or self.floaters < 0 or self.haze + self.floaters >= 1:
+            raise ValueError(
+                f"haze and floaters must leave some splats on the surface, got {self.haze}, {self.floaters}"
+            )
         if not 0 <= self.sh_degree <= 3:
             raise ValueError(f"sh_degree must be 0 to 3, got {self.sh_degree}")
 
@@ -85,7 +107,23 @@ TRAINED = SplatStyle(
 )
 """Many half-transparent, tilted, sunken layers: what training leaves behind, by the figures of trained 2DGS objects."""
 
-STYLES = {"thin": THIN, "trained": TRAINED}
+HAZE = SplatStyle(
+    coverage=9.0,
+    jitter=0.8,
+    aspect=2.4,
+    size_spread=0.55,
+    aspect_spread=0.7,
+    overhang=0.02,
+    tilt=18.0,
+    depth=0.006,
+    opacities=(0.13, 0.6, 0.99),
+    thickness=0.2,
+    haze=0.3,
+    floaters=0.01,
+)
+"""Ordinary 3D Gaussian Splatting: thick splats and needles, a third of them fainter than 0.1 and off the surface."""
+
+STYLES = {"thin": THIN, "trained": TRAINED, "haze": HAZE}
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,11 +133,11 @@ class Sample:
     Parameters
     ----------
     splats : Splats
-        float32, two scales, in no spatial order.
+        float32, in no spatial order.
     surface : Surface
         The ground truth.
     faces : (N,) int64
-        Face of the surface each splat was laid on.
+        Face of the surface each splat was laid on; of haze, the one that it stands over; of floaters, any.
     """
 
     splats: Splats
@@ -131,6 +169,27 @@ def surface_splats(surface: Surface, n_splats: int, style: SplatStyle = THIN, *,
     if not surface.areas.sum() > 0:
         raise ValueError("a surface without area cannot be covered")
     rng = np.random.default_rng(seed)
+    n_haze, n_floaters = round(style.haze * n_splats), round(style.floaters * n_splats)
+    n_laid = max(n_splats - n_haze - n_floaters, 1)
+    faces, points, scales, frames, logits = _laid(surface, n_laid, style, rng)
+    if n_splats > n_laid:
+        hazy = _haze(surface, n_haze, n_splats - n_laid - n_haze, style, rng)
+        pairs = zip((faces, points, scales, frames, logits), hazy, strict=True)
+        faces, points, scales, frames, logits = (np.concatenate(pair) for pair in pairs)
+    if style.thickness > 0:
+        ratios = np.minimum(style.thickness * np.exp(style.thickness_spread * rng.standard_normal(n_splats)), 1.0)
+        scales = np.column_stack([scales, ratios * scales.min(axis=1)])
+    order = rng.permutation(n_splats)
+    splats = _splats(points[order], scales[order], frames[order], logits[order], style.sh_degree, rng)
+    return Sample(splats, surface, faces[order])
+
+
+_Laid = tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+"""Faces, centres, two scales, frames and logits of opacity."""
+
+
+def _laid(surface: Surface, n_splats: int, style: SplatStyle, rng: np.random.Generator) -> _Laid:
+    """Splats that cover the surface."""
     faces, points = even_points(surface, n_splats, style.jitter, rng)
     normals = surface.normals[faces]
     if surface.closed and style.depth > 0:
@@ -143,10 +202,28 @@ def surface_splats(surface: Surface, n_splats: int, style: SplatStyle = THIN, *,
     cutoffs = np.sqrt(2 * np.maximum(np.log(255) - np.log1p(np.exp(-logits)), 0.1))[:, None]
     axes, reaches = fitted_axes(surface, points, normals, cutoffs * scales, style.overhang, rng)
     scales = reaches / cutoffs
-    frames = np.stack([axes, np.cross(normals, axes), normals], 2)
-    order = rng.permutation(n_splats)
-    splats = _splats(points[order], scales[order], frames[order], logits[order], style.sh_degree, rng)
-    return Sample(splats, surface, faces[order])
+    return faces, points, scales, np.stack([axes, np.cross(normals, axes), normals], 2), logits
+
+
+def _haze(surface: Surface, n_haze: int, n_floaters: int, style: SplatStyle, rng: np.random.Generator) -> _Laid:
+    """Faint splats off the surface, and some that float far from it."""
+    n = n_haze + n_floaters
+    faces, points = random_points(surface, n, rng)
+    heights = style.haze_reach * abs(rng.standard_normal(n))
+    if not surface.closed:
+        heights *= np.where(rng.random(n) < 0.5, -1, 1)
+    points = points + heights[:, None] * surface.normals[faces]
+    size = float(np.ptp(surface.vertices, axis=0).max())
+    middle = 0.5 * (surface.vertices.min(axis=0) + surface.vertices.max(axis=0))
+    points[n_haze:] = middle + size * rng.uniform(-1, 1, (n_floaters, 3))
+    scales = _scales(surface.areas.sum() / n, style, rng, n)
+    normals = rng.standard_normal((n, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    axes = random_tangents(normals, rng)
+    low, high = np.log(style.haze_opacities)
+    opacities = np.exp(rng.uniform(low, high, n))
+    logits = np.log(opacities) - np.log1p(-opacities)
+    return faces, points, scales, np.stack([axes, np.cross(normals, axes), normals], 2), logits
 
 
 def shape_sample(name: str, n_splats: int, style: SplatStyle = THIN, *, seed: int = 0) -> Sample:
@@ -299,7 +376,18 @@ def _arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--splats", type=int, default=10_000, help="number of splats (10000)")
     parser.add_argument("--regime", choices=sorted(STYLES), default="thin", help="how they lie on the surface (thin)")
     parser.add_argument("--seed", type=int, default=0, help="random seed (0)")
-    for name in ("coverage", "jitter", "aspect", "size_spread", "overhang", "tilt", "depth"):
+    for name in (
+        "coverage",
+        "jitter",
+        "aspect",
+        "size_spread",
+        "overhang",
+        "tilt",
+        "depth",
+        "thickness",
+        "haze",
+        "floaters",
+    ):
         option = "--" + name.replace("_", "-")
         parser.add_argument(option, type=float, help=f"{name.replace('_', ' ')}, in place of the regime's")
     parser.add_argument("--bundled", type=Path, metavar="FOLDER", help="write the samples that travel with the program")

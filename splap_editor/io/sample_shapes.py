@@ -248,6 +248,59 @@ def book(spacing: float = 0.045) -> Surface:
     return Surface(np.stack([x * 1.25, y * 1.25, bent], 1), surface.faces)
 
 
+def figure(spacing: float = 0.03) -> Surface:
+    """A person with legs 0.06 apart, one arm stretched out and the hand of the other 0.012 from the hip."""
+    limbs: list[tuple[Sequence[float], Sequence[float], float]]
+    limbs = [((0, 0, -0.2), (0, 0, 0.5), 0.27), ((0, 0, 0.5), (0, 0, 0.9), 0.1), ((0, 0, 1.02), (0, 0, 1.05), 0.2)]
+    limbs += [((0.15 * side, 0, -0.2), (0.15 * side, 0, -1.15), 0.12) for side in (-1, 1)]
+    limbs += [((0.2 * side, 0, 0.5), (1.15 * side, 0, 0.5), 0.1) for side in (-1, 1)]
+
+    def distance(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        soft = 0.025
+        return -soft * np.logaddexp.reduce([-_to_capsule(points, *limb) / soft for limb in limbs], axis=0)
+
+    surface = level_set(distance, spacing=spacing)
+    # Laid on with the arm away from the body, where marching cubes see the air between, and bent to the hip then.
+    shoulder, elbow, bend = np.array([0.3, 0.0, 0.5]), np.array([0.72, 0.0, 0.5]), 0.12
+    vertices = _bent(surface.vertices, elbow, np.radians(44.0), bend)
+    return Surface(_bent(vertices, shoulder, np.radians(61.0), bend), surface.faces)
+
+
+def _to_capsule(
+    points: NDArray[np.float64], start: Sequence[float], end: Sequence[float], radius: float
+) -> NDArray[np.float64]:
+    """Signed distance to what is within a radius of a stretch."""
+    a, ab = np.asarray(start, np.float64), np.subtract(end, start)
+    along = np.clip((points - a) @ ab / (ab @ ab), 0.0, 1.0)
+    return np.linalg.norm(points - a - along[:, None] * ab, axis=1) - radius
+
+
+def _bent(points: NDArray[np.float64], joint: NDArray[np.float64], angle: float, reach: float) -> NDArray[np.float64]:
+    """Turn what lies beyond a joint in x about it, from x towards -z; within ``reach`` of it, by a part."""
+    share = np.clip(0.5 + 0.5 * (points[:, 0] - joint[0]) / reach, 0.0, 1.0)
+    # Of the trunk below and above the joint nothing turns.
+    beside = np.clip((0.3 - abs(points[:, 2] - joint[2])) / 0.15, 0.0, 1.0)
+    share = np.where(share < 1.0, share * beside, share)
+    angles = angle * share**2 * (3.0 - 2.0 * share)
+    x, y, z = (points - joint).T
+    c, s = np.cos(angles), np.sin(angles)
+    return joint + np.stack([c * x + s * z, y, c * z - s * x], 1)
+
+
+def strap(spacing: float = 0.03) -> Surface:
+    """A flat strap in a loop; its ends run side by side, 0.03 apart, for a third of its length."""
+    t = np.linspace(-1.0, 1.0, 801)
+    # From one end down the neck, round the loop and up again.
+    far = np.sqrt(t**2 + 0.01)
+    opening = 0.55 * np.sqrt(np.clip(1.0 - far / 0.75, 0.0, 1.0)) * np.sin(np.pi * np.clip(1.4 * far, 0.0, 1.0)) ** 2
+    curve = np.stack([np.tanh(t / 0.1) * (0.055 + opening), np.zeros_like(t), 2.4 * far - 1.2], 1)
+    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
+    even = np.linspace(0.0, lengths[-1], round(lengths[-1] / spacing))
+    curve = np.stack([np.interp(even, lengths, curve[:, axis]) for axis in range(3)], 1)
+    surface = swept_tube(curve, 0.04, spacing=spacing)
+    return Surface(surface.vertices * [1.0, 2.5, 1.0], surface.faces)
+
+
 def tube(spacing: float = 0.05) -> Surface:
     """A bent arm: a thick tube with an elbow, 2.5 long."""
     t = np.linspace(-1, 1, round(2.9 / spacing))
@@ -290,6 +343,20 @@ def plane(spacing: float = 0.05) -> Surface:
 
 SHAPES: dict[str, Callable[[], Surface]] = {
     shape.__name__: shape
-    for shape in (bench, comb, birdcage, cheese, coil, book, tube, folded_sheet, two_sheets, slats, plane)
+    for shape in (
+        bench,
+        comb,
+        birdcage,
+        cheese,
+        coil,
+        book,
+        figure,
+        strap,
+        tube,
+        folded_sheet,
+        two_sheets,
+        slats,
+        plane,
+    )
 }
 """Every shape by name."""

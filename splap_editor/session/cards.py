@@ -19,6 +19,7 @@ INERT_WORDS = {
     InertReason.ZERO_QUATERNION: "its rotation is all zero",
     InertReason.ZERO_SIZE: "it has no size",
     InertReason.REMOVED: "it is removed",
+    InertReason.FOLLOWS: "it is faint, and follows the splats around it",
 }
 """Why a splat takes no part in the graph."""
 

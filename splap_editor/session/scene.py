@@ -26,7 +26,7 @@ class Scene:
 
     def __init__(self, file: SplatFile, ellipses: Ellipses) -> None:
         self.file = file
-        self.ellipses = ellipses
+        self.ellipses = self.visible = ellipses
         self.surface: Surface | None = None
         self.edit = Edit()
         self.preview: Edit | None = None
@@ -97,7 +97,7 @@ class Scene:
         """Take the graph, Laplacian and kernel carriers with their ellipses, or none while they are made anew."""
         self.surface = surface
         if surface is not None:
-            self.ellipses = surface.ellipses
+            self.ellipses, self.visible = surface.ellipses, surface.visible
         self.surface_changed.emit()
 
     def set_edit(self, edit: Edit) -> None:

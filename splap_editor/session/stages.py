@@ -182,7 +182,7 @@ class Stage:
 def _surface_request(ledger: Ledger) -> SurfaceRequest:
     scene = ledger.shown_scene
     edit = scene.shown_edit
-    return SurfaceRequest(scene, scene.surface, edit.graph, edit.removal, scene.ellipses, ledger.cache)
+    return SurfaceRequest(scene, scene.surface, edit.graph, edit.removal, scene.visible, ledger.cache)
 
 
 def _bind_request(ledger: Ledger) -> BindRequest:

@@ -63,7 +63,7 @@ def opened_scene(job: Job, request: OpenRequest) -> OpenedScene:
     if request.restore is not None:
         request.restore(scene)
         if scene.edit.removed is not None:
-            scene.ellipses = occupancy_ellipses(file.splats, removed=scene.edit.removed)
+            scene.ellipses = scene.visible = occupancy_ellipses(file.splats, removed=scene.edit.removed)
     return OpenedScene(scene, hand_over)
 
 

@@ -39,10 +39,19 @@ from splap_editor.io.sample_shapes import SHAPES, Surface
 from tests.benchmark.ground_truth import GroundTruth, Pull, plain_arap
 from tests.benchmark.peers import machine, note, report
 
-OBJECTS = {"bench": 25_000, "comb": 20_000, "birdcage": 15_000, "cheese": 25_000, "coil": 20_000, "book": 25_000}
+OBJECTS = {
+    "bench": 25_000,
+    "comb": 20_000,
+    "birdcage": 15_000,
+    "cheese": 25_000,
+    "coil": 20_000,
+    "book": 25_000,
+    "figure": 12_000,
+    "strap": 8_000,
+}
 TRAINED = {"bench": "bench_2dgs.ply"}
 """Trained scenes whose mesh is a shape of the sample maker."""
-RULES = {"paper": GraphOptions(rule="paper"), "touch": GraphOptions()}
+RULES = {"paper": GraphOptions(rule="paper"), "touch": GraphOptions(), "solid": GraphOptions(carriers="solid")}
 RADII = (0.05, 0.075, 0.1)
 
 Solver = Callable[[NDArray[np.float64], sp.csr_matrix, NDArray[np.int64], NDArray[np.float64]], Deformation]

@@ -19,6 +19,7 @@ def _ellipses(centers, inert_rows=()):
         normals=np.tile([0.0, 0.0, 1.0], (n, 1)),
         cutoffs=np.ones(n),
         axes=np.tile(np.array([0, 1, 2], np.int8), (n, 1)),
+        opacities=np.ones(n),
         subject=MainSubject(10.0, np.zeros(3), 5.0 * np.eye(3)),
         n_splats=n_splats,
         inert=inert,

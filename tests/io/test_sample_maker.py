@@ -8,7 +8,16 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from splap_editor.io import sample_maker
-from splap_editor.io.sample_maker import THIN, TRAINED, SplatStyle, big_scene, line_splats, shape_sample, surface_splats
+from splap_editor.io.sample_maker import (
+    HAZE,
+    THIN,
+    TRAINED,
+    SplatStyle,
+    big_scene,
+    line_splats,
+    shape_sample,
+    surface_splats,
+)
 from splap_editor.io.sample_shapes import SHAPES, Surface, folded_sheet, plane, slats, two_sheets
 
 N = 600
@@ -51,7 +60,9 @@ def test_shape_is_a_consistently_oriented_manifold_of_the_papers_size(name):
     assert len(np.unique(surface.faces)) == len(surface.vertices)
 
 
-@pytest.mark.parametrize("name", ["bench", "comb", "birdcage", "cheese", "coil", "book", "tube", "folded_sheet"])
+@pytest.mark.parametrize(
+    "name", ["bench", "comb", "birdcage", "cheese", "coil", "book", "figure", "strap", "tube", "folded_sheet"]
+)
 def test_one_object_is_one_part(name):
     assert _n_parts(SHAPES[name]()) == 1
 
@@ -238,3 +249,45 @@ def test_command_line_wants_a_shape_and_an_output(capsys):
     with pytest.raises(SystemExit, match="2"):
         sample_maker.main(["tube"])
     assert "give a shape and -o OUT.ply" in capsys.readouterr().err
+
+
+def test_haze_has_the_statistics_of_ordinary_captures():
+    splats = surface_splats(plane(), 6000, HAZE, seed=1).splats
+    assert splats.n_scales == 3 and splats.n_splats == 6000
+    scales, opacities = np.sort(splats.scales, axis=1), splats.opacities
+    assert 0.28 < np.mean(opacities < 0.1) < 0.36
+    assert 0.15 < np.median(scales[:, 0] / scales[:, 1]) < 0.25
+    assert np.mean(scales[:, 2] / scales[:, 1] > 5) > 0.05
+    heights = abs(splats.means[:, 2])
+    floats = (abs(splats.means) > 1.4).any(axis=1)
+    assert 0.005 < np.mean(floats) < 0.02
+    # What is faint stands off the surface, on both sides of a sheet; what is solid does not.
+    faint = (opacities < 0.1) & ~floats
+    assert np.median(heights[faint]) > 0.01 and np.median(heights[opacities > 0.2]) < 0.01
+    assert 0.4 < np.mean(splats.means[faint & (heights > 0.02), 2] > 0) < 0.6
+
+
+def test_haze_covers_its_surface_without_what_is_faint():
+    sample = surface_splats(plane(), 6000, HAZE, seed=2)
+    solid = sample.splats.means[sample.splats.opacities >= 0.1]
+    inner = SHAPES["plane"]().vertices
+    assert cKDTree(solid).query(inner[(abs(inner) < 1.2).all(axis=1)])[0].max() < 0.15
+
+
+def test_the_figures_hand_rests_close_to_its_hip_and_the_straps_ends_side_by_side():
+    for shape, low, high in (("figure", 0.008, 0.02), ("strap", 0.02, 0.04)):
+        surface = SHAPES[shape]()
+        middles = surface.vertices[surface.faces].mean(axis=1)
+        rightward = surface.normals[:, 0] > 0.5
+        leftward = (surface.normals[:, 0] < -0.5) & (middles[:, 0] > 0.01)
+        # From a wall that faces right to the one across the air that faces it.
+        step = cKDTree(middles[rightward]).query(middles[leftward])
+        across = middles[leftward] - middles[rightward][step[1]]
+        gaps = step[0][across[:, 0] > 0.9 * step[0]]
+        assert low < gaps.min() < high, shape
+
+
+@pytest.mark.parametrize("wrong", [{"haze": 0.7, "floaters": 0.3}, {"haze": -0.1}, {"thickness": 2.0}])
+def test_haze_that_cannot_be_is_refused(wrong):
+    with pytest.raises(ValueError, match=r"thickness must|haze and floaters must"):
+        SplatStyle(**wrong)

@@ -46,12 +46,13 @@ def _picture(splats, ellipses, view, extent, pixel):
         axes = _rotation(splats.quats[row].astype(float))[:, : splats.n_scales] * splats.scales[row]
         flat = view[:2] @ axes @ axes.T @ view[:2].T / pixel**2
         blurred = flat + BLUR * np.eye(2)
-        dimmed = splats.opacities[row] * np.sqrt(np.linalg.det(flat + trained * np.eye(2)) / np.linalg.det(blurred))
+        dimming = np.sqrt(np.linalg.det(flat + trained * np.eye(2)) / np.linalg.det(blurred))
         d = np.stack([xs - columns / 2 - local[i, 0] / pixel, ys - lines / 2 - local[i, 1] / pixel], axis=-1)
         square = np.einsum("hwa,ab,hwb->hw", d, np.linalg.inv(blurred), d)
-        alpha = np.minimum(0.99, dimmed * np.exp(-0.5 * square))
-        alpha[(square > min(ellipses.cutoffs[i] ** 2, REACH)) | (light <= DARK)] = 0
-        weights[i], peaks[i] = (alpha * light).sum(), (alpha * light).max()
+        kernel = splats.opacities[row] * np.exp(-0.5 * square)
+        kernel[(square > min(ellipses.cutoffs[i] ** 2, REACH)) | (light <= DARK)] = 0
+        alpha = np.minimum(0.99, dimming * kernel)
+        weights[i], peaks[i] = (alpha * light).sum(), (kernel * light).max()
         light *= 1 - alpha
     return weights, peaks
 

@@ -18,6 +18,20 @@ GRAPH_RULES = {
 }
 """Rules by name: ``rule(tree, epsilon, progress)`` gives (E, 2) edges and their (E,) touch scales or None."""
 
+CARRIERS = {
+    "all": Choice(
+        "Every splat",
+        "Every visible splat belongs to the surface.",
+        "splap_editor.core.graph.carriers:all_splats",
+    ),
+    "solid": Choice(
+        "Splats that are not faint",
+        "Splats fainter than 0.1 are haze: they follow the surface and do not hold it together.",
+        "splap_editor.core.graph.carriers:solid_splats",
+    ),
+}
+"""Who makes up the surface, by name: ``carries(ellipses)`` gives (n,) bool; the others follow."""
+
 
 @dataclass(frozen=True)
 class Neighborhood(Choice):
@@ -147,6 +161,8 @@ class GraphOptions:
         One of `NEIGHBORHOODS`.
     laplacian : str
         One of `LAPLACIANS`.
+    carriers : str
+        One of `CARRIERS`.
     """
 
     rule: str = option("touch", "How neighbours are chosen.", label="Rule", choices=GRAPH_RULES)
@@ -172,6 +188,9 @@ class GraphOptions:
     neighborhood: str = option("geodesic", "Who counts as near a splat.", label="Nearest by", choices=NEIGHBORHOODS)
     laplacian: str = option(
         "stars", "How the stars of all splats become a Laplacian.", label="Laplacian", choices=LAPLACIANS
+    )
+    carriers: str = option(
+        "all", "Which splats make up the surface; the others follow it.", label="Made of", choices=CARRIERS
     )
 
     def __post_init__(self) -> None:

@@ -48,7 +48,7 @@ class Contributions:
         Blending weight, summed over the pixels of all pictures: the mean area that a splat fills in a picture, in
         units of the scene's size squared.
     peaks : (n,) float64
-        Largest blending weight in any pixel, in [0, 1].
+        Largest blending weight in any pixel, in [0, 1], if the picture were fine enough for the splat.
     """
 
     weights: NDArray[np.float64]
@@ -167,7 +167,8 @@ def _composite(order, view, points, axes, opacities, squares, trained_blur, ligh
         if not determinant < 1e300:
             continue
         sharp = area + trained_blur * (xx + yy) + trained_blur * trained_blur
-        opacity = opacities[i] * np.sqrt(sharp / determinant)
+        dimming = np.sqrt(sharp / determinant)
+        opacity = opacities[i] * dimming
         xx, yy = xx + _BLUR, yy + _BLUR
         step, per_yy, slope = yy / determinant, 1.0 / yy, xy / yy
         growth = np.exp(-step)
@@ -190,8 +191,9 @@ def _composite(order, view, points, axes, opacities, squares, trained_blur, ligh
                 if left > _DARK:
                     weight = min(0.99, alpha) * left
                     total += weight
-                    peak = max(peak, weight)
+                    peak = max(peak, alpha * left)
                     light[line, column] = left - weight
                 alpha, ratio = alpha * ratio, ratio * growth
         weights[i] += total
-        peaks[i] = max(peaks[i], peak)
+        # What is dimmed here for want of pixels is bright where there are more.
+        peaks[i] = max(peaks[i], peak / dimming)

@@ -40,6 +40,8 @@ class InertReason(IntEnum):
     """Both in-plane scales are zero."""
     REMOVED = 6
     """The edit leaves it out."""
+    FOLLOWS = 7
+    """It is left out of the surface on purpose, see `splap_editor.core.graph.carriers`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +67,8 @@ class Ellipses:
     axes : (n, 3) int8
         Stored scale and rotation column that the major axis, the minor axis
         and the normal come from.
+    opacities : (n,) float64
+        Effective opacities, in (0, 1].
     subject : MainSubject
         What the scene is of; its size is positive.
     n_splats : int
@@ -79,6 +83,7 @@ class Ellipses:
     normals: NDArray[np.float64]
     cutoffs: NDArray[np.float64]
     axes: NDArray[np.int8]
+    opacities: NDArray[np.float64]
     subject: MainSubject
     n_splats: int
     inert: NDArray[np.uint8]
@@ -188,6 +193,7 @@ def occupancy_ellipses(
         normals=np.cross(columns[:, 0], columns[:, 1]),
         cutoffs=cutoffs,
         axes=axes,
+        opacities=np.asarray(opacities[rows], np.float64),
         subject=_subject(centers, opacities[rows], major),
         n_splats=splats.n_splats,
         inert=inert,

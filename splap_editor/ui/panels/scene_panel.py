@@ -75,7 +75,7 @@ class ScenePanel(QWidget):
                 value.setText("–")
             return
         splats, file = scene.splats, scene.file
-        n_inert = splats.n_splats - scene.ellipses.n_nodes
+        n_inert = splats.n_splats - scene.visible.n_nodes
         self.facts["file"].setText(file.path.name)
         set_plain_tip(self.facts["file"], str(file.path))
         self.facts["layout"].setText(f"{file.layout.name}: {file.layout.reason}")
