@@ -18,7 +18,7 @@ from splap_editor.core.splats.spherical_harmonics import view_colors
 from splap_editor.core.splats.splats import Splats
 from splap_editor.core.surface.geodesics import geodesic_distances
 from splap_editor.engine.bound_edit import bind, ready_for_drags
-from splap_editor.engine.edit import Edit, Handle, Pose
+from splap_editor.engine.edit import Edit, Handle, Pin, Pose
 from splap_editor.engine.surface import surface_of
 from splap_editor.io.ply_header import ply_header
 from splap_editor.io.ply_lists import list_table
@@ -32,7 +32,7 @@ def call_every_loop() -> None:
     surface_of(splats, GraphOptions(rule="paper"))
     ready_for_drags(surface)
     handles = (Handle(1, "", "#ffffff", Region(surface.rest[0], 0.1), Pose((0.0, 0.0, 0.3), (0.9, 0.1, 0.2, 0.3))),)
-    pins = (Region(surface.rest[-1], 0.1),)
+    pins = (Pin(1, "", Region(surface.rest[-1], 0.1)),)
     for method in method_titles():
         edit = Edit(handles, pins, method, OptionSet(ReachOptions(None)))
         bound = bind(surface, edit)
