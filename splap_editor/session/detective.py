@@ -4,12 +4,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from splap_editor.core.graph.carriers import SOLID
 from splap_editor.core.index_spaces import FileRows
 from splap_editor.core.splats.occupancy import Ellipses, InertReason
 from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.scene_info import flatness
 from splap_editor.io.layout import Layout
 from splap_editor.io.lint import lint
+
+HAZY = 0.05
+"""With a larger share of faint splats a scene is called hazy, unless its splats are flat."""
 
 ROUND = 0.6
 """A splat is nearly round if its smallest scale is more than this share of its middle one."""
@@ -74,7 +78,11 @@ def reading(layout: Layout, splats: Splats) -> str:
 
 
 def verdict(splats: Splats) -> tuple[str, str]:
-    """Say how far to trust the graph, from how flat the splats are.
+    """Say how far to trust the graph, from how flat the splats are and how many are faint.
+
+    A few connections through the air are enough to tear or tether a part, so a
+    scene is as trustworthy as the worse of its splats: thick ones and haze reach
+    across gaps, however flat the others are.
 
     Returns
     -------
@@ -86,6 +94,15 @@ def verdict(splats: Splats) -> tuple[str, str]:
     middle, high = shares["p50"], shares["p95"]
     if middle < 0.1 and high < 0.5:
         return "Flat splats: connections follow the surface.", ""
+    hazy = float(np.mean(splats.opacities < SOLID))
+    if hazy > HAZY:
+        return (
+            f"Haze: {hazy:.0%} of the splats are fainter than {SOLID:g} and may hold parts together that only come "
+            'close. Let them follow ("Made of" in the Graph panel), and separate what touches.',
+            "warning",
+        )
+    if middle < 0.3 and high >= 0.5:
+        return "Flat and thick splats mixed: connections may cross narrow gaps. Separate parts that touch.", "warning"
     if middle < 0.3:
         return "Mostly flat: connections are good; look at thin parts and gaps.", ""
     if middle < ROUND:

@@ -65,3 +65,18 @@ def test_the_reading_says_activations_and_normal(path):
     plain, turned = read_ply(path), read_ply(path, layout="spikinggs@0")
     assert reading(plain.layout, plain.splats).endswith("opacities through a sigmoid; the thinnest axis is the normal")
     assert reading(turned.layout, turned.splats).endswith("opacities as they are; axis 0 is the normal")
+
+
+def test_the_verdict_warns_of_haze_and_of_thick_splats_among_flat_ones(file):
+    splats = file.splats
+    n = splats.n_splats
+    thin = np.tile(np.log([1.0, 0.8, 0.16]), (n, 1)).astype(np.float32)
+    mixed = thin.copy()
+    mixed[: n // 10, 2] = np.log(0.7)
+    hazy = np.full(n, 3.0, np.float32)
+    hazy[: n // 10] = -3.0
+    words, tone = verdict(replace(splats, log_scales=mixed, logit_opacities=np.full(n, 3.0, np.float32)))
+    assert tone == "warning" and "mixed" in words
+    words, tone = verdict(replace(splats, log_scales=thin, logit_opacities=hazy))
+    assert tone == "warning" and words.startswith("Haze: 10% of the splats")
+    assert verdict(replace(splats, log_scales=np.log([[1.0, 0.8, 0.01]]).repeat(n, 0), logit_opacities=hazy))[1] == ""
