@@ -157,7 +157,7 @@ class FileActions:
         box.setInformativeText("It is lost when another file is opened or the window is closed.")
         box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         save = box.addButton("Save" if self._documents.path else "Save…", QMessageBox.ButtonRole.AcceptRole)
-        export = box.addButton("Export PLY…", QMessageBox.ButtonRole.AcceptRole)
+        export = box.addButton("Export…", QMessageBox.ButtonRole.AcceptRole)
         discard = box.addButton("Discard", QMessageBox.ButtonRole.DestructiveRole)
         box.addButton("Cancel", QMessageBox.ButtonRole.RejectRole)
         box.setDefaultButton(save)

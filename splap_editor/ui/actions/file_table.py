@@ -46,7 +46,7 @@ FILE_TABLE: tuple[ActionSpec, ...] = (
     A(
         "file.export",
         FileActions.export,
-        "&Export PLY…",
+        "&Export…",
         ("Ctrl+E",),
         icon="export",
         tip="Write what is on screen as a PLY, row for row.",
