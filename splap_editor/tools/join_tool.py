@@ -77,7 +77,7 @@ class JoinTool(TwoPartTool):
         elif self.found is not None and len(self.found.rows):
             graph, joint = scene.edit.graph, self.found.stroke
             self.drop()
-            session.change_edit(scene.edit.with_options(replace(graph, join=(*graph.join, joint))), "Join")
+            session.steps.change_edit(scene.edit.with_options(replace(graph, join=(*graph.join, joint))), "Join")
         else:
             return bool(self.parts)
         return True

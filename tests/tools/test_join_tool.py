@@ -17,7 +17,7 @@ def slit(hand):
     first = means[:, axis] < np.median(means[:, axis])
     surface = hand.scene.surface
     cut = with_cut(GraphOptions(), edges_between(surface.ellipses, surface.graph, first, ~first))
-    hand.session.change_edit(hand.scene.edit.with_options(cut), "Cut")
+    hand.session.steps.change_edit(hand.scene.edit.with_options(cut), "Cut")
     hand.main.run_until(lambda: hand.scene.surface is not None and hand.scene.surface.options == cut)
     hand.settle()
     hand.tools.choose("join")
