@@ -8,11 +8,12 @@ import pytest
 from hypothesis import given, settings
 
 from splap_editor.io.ply import read_ply, write_ply
+from tests.campaign.checks import CHECKS
 from tests.campaign.inputs import Found, try_inputs
 from tests.campaign.seeds import odd_plys
 from tests.campaign.writes import try_writes
 
-N_INPUTS = 2500
+N_INPUTS = 4000
 N_WRITES = 48
 
 
@@ -20,7 +21,7 @@ def test_no_input_breaks_anything():
     found = try_inputs(20, range(N_INPUTS), inf, Found())
     assert found.failures == []
     assert found.counts["inputs"] == N_INPUTS
-    assert min(found.counts[f"{kind} accepted"] for kind in ("ply", "recipe", "session", "npz", "cache")) > 20
+    assert min(found.counts[f"{kind} accepted"] for kind in CHECKS) > 20
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="writers are forked to start fast")
