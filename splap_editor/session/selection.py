@@ -43,6 +43,13 @@ def shrunk_selection(selection: FileMask, ellipses: Ellipses, graph: SplatGraph)
     return _with_nodes(selection, ellipses, nodes & ~outside)
 
 
+def rim_selection(selection: FileMask, ellipses: Ellipses, graph: SplatGraph) -> FileMask:
+    """Keep only the selected splats that have a neighbour outside the selection; inert ones have none."""
+    return _with_nodes(np.zeros_like(selection), ellipses, selection[ellipses.rows]) & ~shrunk_selection(
+        selection, ellipses, graph
+    )
+
+
 def connected_selection(selection: FileMask, ellipses: Ellipses, graph: SplatGraph) -> FileMask:
     """Select every splat in a component of the graph that holds a selected one."""
     nodes = selection[ellipses.rows]

@@ -99,11 +99,23 @@ class SelectTool(Tool):
 
 
 def picking(
-    act: Callable[..., Used], sentence: str, brief: str = "", *, gesture: str = "Drag", at_once: bool = False
+    act: Callable[..., Used],
+    sentence: str,
+    brief: str = "",
+    *,
+    gesture: str = "Drag",
+    also: str = "",
+    at_once: bool = False,
 ) -> tuple[Binding, ...]:
-    """Rows for a gesture with each of the modifiers; ``act(tool, event, mode)``."""
+    """Rows for a gesture, or another, with each of the modifiers; ``act(tool, event, mode)``."""
     return tuple(
-        Binding((held + gesture,), partial(act, mode=mode), what or sentence, what.lower() or brief, at_once=at_once)
+        Binding(
+            tuple(held + each for each in (gesture, also) if each),
+            partial(act, mode=mode),
+            what or sentence,
+            what.lower() or brief,
+            at_once=at_once,
+        )
         for held, mode, what in MODES
     )
 

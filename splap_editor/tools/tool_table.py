@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from splap_editor.tools.axes_tool import AxesTool
+from splap_editor.tools.ball_tool import BallTool
 from splap_editor.tools.bindings import Binding
 from splap_editor.tools.brush_tool import BrushTool
 from splap_editor.tools.click_tool import ClickTool
@@ -12,8 +13,10 @@ from splap_editor.tools.join_tool import JoinTool
 from splap_editor.tools.lasso_tool import LassoTool
 from splap_editor.tools.navigate_tool import NavigateTool
 from splap_editor.tools.pin_tool import PinTool
+from splap_editor.tools.polygon_tool import PolygonTool
 from splap_editor.tools.rectangle_tool import RectangleTool
 from splap_editor.tools.separate_tool import SeparateTool
+from splap_editor.tools.similar_tool import SimilarTool
 from splap_editor.tools.tool import Tool, ToolContext
 from splap_editor.tools.tool_manager import ToolManager
 from splap_editor.tools.transform_tool import TransformTool
@@ -57,6 +60,9 @@ TOOLS: tuple[ToolEntry, ...] = (
     ToolEntry(RectangleTool, "&Rectangle", "Q", "Drag a frame to select splats, or click them.", "Select"),
     ToolEntry(LassoTool, "&Lasso", "K", "Draw round splats to select them.", "Select"),
     ToolEntry(BrushTool, "&Brush", "C", "Paint a selection.", "Select"),
+    ToolEntry(PolygonTool, "P&olygon", "Shift+K", "Click corners round splats to select them.", "Select"),
+    ToolEntry(BallTool, "B&all", "Shift+C", "Drag a ball out of the surface to select what is in it.", "Select"),
+    ToolEntry(SimilarTool, "Si&milar", "Shift+L", "Select splats like the one clicked, or flood from it.", "Select"),
     ToolEntry(ClickTool, "&Click", "Shift+Q", "Select splats one by one; a drag looks around.", "Select"),
     ToolEntry(HandleTool, "&Handle", "W", "Click the surface to place a handle.", "Place handles and pins"),
     ToolEntry(PinTool, "&Pin", "E", "Click the surface to hold it in place.", "Place handles and pins"),

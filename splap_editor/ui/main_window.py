@@ -215,7 +215,7 @@ class MainWindow(FileDrop, QMainWindow):
                 PoseActions(session, self.toast),
                 self.selection_sets,
                 EditActions(session, tools),
-                SelectActions(session, through),
+                SelectActions(session, through, view.viewport),
                 handles,
                 RemovalActions(session, handles, self.toast),
                 DisplayActions(self.display),

@@ -123,6 +123,22 @@ EDIT_TABLE: tuple[ActionSpec, ...] = (
         menu="&Select",
     ),
     A(
+        "select.rim",
+        SelectActions.rim,
+        "&Rim of selection",
+        tip="Keep only selected splats with a neighbour that is not.",
+        needs=has_selection_on_surface,
+        menu="&Select",
+    ),
+    A(
+        "select.front",
+        SelectActions.front,
+        "&Front layer",
+        tip="Keep only what nothing hides in the view; without a selection, select all of that.",
+        needs=has_scene,
+        menu="&Select",
+    ),
+    A(
         "select.hide",
         SelectActions.hide,
         "Hi&de selected",

@@ -5,17 +5,19 @@ from dataclasses import replace
 import numpy as np
 
 from splap_editor.session.scene import Scene
-from splap_editor.session.selection import connected_selection, grown_selection, shrunk_selection
+from splap_editor.session.selection import connected_selection, grown_selection, rim_selection, shrunk_selection
 from splap_editor.session.session import Session
 from splap_editor.tools.select_tool import SelectOptions
 from splap_editor.tools.tool import Held
+from splap_editor.viewport.viewport import Viewport
 
 
 class SelectActions:
     """Selecting and hiding by name; each is one undoable step."""
 
-    def __init__(self, session: Session, options: Held[SelectOptions]) -> None:
+    def __init__(self, session: Session, options: Held[SelectOptions], viewport: Viewport) -> None:
         self._session = session
+        self._viewport = viewport
         self._options = options
 
     @property
@@ -48,6 +50,20 @@ class SelectActions:
         """Select all that hangs together with the selection."""
         scene = self._scene
         self._select(connected_selection(scene.selection, scene.ellipses, scene.prepared.graph), "Select connected")
+
+    def rim(self) -> None:
+        """Keep only those with a neighbour outside."""
+        scene = self._scene
+        self._select(rim_selection(scene.selection, scene.ellipses, scene.prepared.graph), "Select rim")
+
+    def front(self) -> None:
+        """Keep only what nothing hides in the view; without a selection, take all of that."""
+        screen = self._viewport.screen_points()
+        width, height = self._viewport.projection.width, self._viewport.projection.height
+        within = self._viewport.in_rectangle(screen, 0, 0, width, height)
+        if self._scene.selection.any():
+            within &= self._scene.selection
+        self._select(self._viewport.visible_only(screen, within), "Select front layer")
 
     def hide(self) -> None:
         """Hide the selected splats."""
