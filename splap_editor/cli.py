@@ -6,6 +6,7 @@ import math
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import splap_editor
 from splap_editor.cleaning_cli import add_clean, add_place
@@ -13,6 +14,10 @@ from splap_editor.core.graph.options import EDGE_OPTIONS, GraphOptions
 from splap_editor.core.options import options_of
 from splap_editor.installation import commands as installation
 from splap_editor.stage_report import ShareLine, StageReport
+
+if TYPE_CHECKING:
+    from splap_editor.io.formats.table import SplatFormat
+    from splap_editor.io.ply import SplatFile
 
 EXIT_OK, EXIT_REFUSED = 0, 2
 
@@ -184,7 +189,6 @@ def _deform(options: argparse.Namespace) -> int:
     from splap_editor.engine.scripting import write_posed
     from splap_editor.frames_cli import deform_frames, edit_for, read_edit_file
     from splap_editor.io.formats.table import format_to_write
-    from splap_editor.io.splat_files import losses_of_saving, read_splats
     from splap_editor.session.side_by_side import side_by_side
 
     if options.frames is not None:
@@ -193,13 +197,7 @@ def _deform(options: argparse.Namespace) -> int:
     row = format_to_write(options.output)
     columns = column_names(options.columns)
     held = read_edit_file(options)
-    with report("read"):
-        file = read_splats(options.file, layout=options.layout, progress=report.progress)
-    for warning in file.warnings:
-        report.say(f"note: {warning}")
-    lost = losses_of_saving(file, row)
-    for loss in lost:
-        report.say(f"lost in {options.output.name}: {loss}")
+    file, lost = _read_to_write(options, row, report)
     edit = edit_for(held, file, report.say)
     cache = None if options.no_cache else StageCache(say=lambda text: report.say(f"note: {text}"))
     made = posed(file, edit, cache=cache, stages=report.stage, run=side_by_side(), with_surface=bool(columns))
@@ -231,16 +229,12 @@ def _deform(options: argparse.Namespace) -> int:
     return EXIT_OK
 
 
-def _convert(options: argparse.Namespace) -> int:
-    from splap_editor.io.formats.table import endings_to_write, format_named, format_to_write
-    from splap_editor.io.splat_files import FormatError, losses_of_saving, read_splats, write_splats
+def _read_to_write(
+    options: argparse.Namespace, row: "SplatFormat", report: StageReport
+) -> tuple["SplatFile", list[str]]:
+    """Read the file, and say what to know about it and what is lost in the format that it is to be written in."""
+    from splap_editor.io.splat_files import losses_of_saving, read_splats
 
-    report = StageReport(quiet=options.quiet or options.json)
-    if format_named(options.output) is None:
-        raise FormatError(
-            f"{options.output.name} ends in no known format. Choose a name with one of {endings_to_write()}."
-        )
-    row = format_to_write(options.output)
     with report("read"):
         file = read_splats(options.file, layout=options.layout, progress=report.progress)
     for warning in file.warnings:
@@ -248,6 +242,20 @@ def _convert(options: argparse.Namespace) -> int:
     lost = losses_of_saving(file, row)
     for loss in lost:
         report.say(f"lost in {options.output.name}: {loss}")
+    return file, lost
+
+
+def _convert(options: argparse.Namespace) -> int:
+    from splap_editor.io.formats.table import endings_to_write, format_named, format_to_write
+    from splap_editor.io.splat_files import FormatError, write_splats
+
+    report = StageReport(quiet=options.quiet or options.json)
+    if format_named(options.output) is None:
+        raise FormatError(
+            f"{options.output.name} ends in no known format. Choose a name with one of {endings_to_write()}."
+        )
+    row = format_to_write(options.output)
+    file, lost = _read_to_write(options, row, report)
     with report("write"):
         write_splats(options.output, file, file.splats, as_3dgs=options.as_3dgs, progress=report.progress)
     if options.json:

@@ -298,11 +298,6 @@ def _kept_in(cache: StageCache, made_from: tuple[object, ...]) -> Keep:
     """Keep results under the hash of what they are made from."""
 
     def keep(name: object, make: Callable[[], T], packed: Callable[[T], Arrays], unpacked: Callable[[Arrays], T]) -> T:
-        key = content_key((*made_from, name))
-        kept = cache.load(key, unpacked)
-        if kept is None:
-            kept = make()
-            cache.store(key, packed(kept))
-        return kept
+        return cache.kept(content_key((*made_from, name)), make, packed, unpacked)
 
     return keep

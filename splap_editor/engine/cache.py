@@ -57,6 +57,16 @@ class StageCache:
         # Taking the one item is atomic, so that of two threads one says it.
         self._unsaid = [True]
 
+    def kept(
+        self, key: str, make: Callable[[], T], packed: Callable[[T], Arrays], unpacked: Callable[[Arrays], T]
+    ) -> T:
+        """Make something of the arrays kept under ``key``; where there are none, make it anew and keep its arrays."""
+        found = self.load(key, unpacked)
+        if found is None:
+            found = make()
+            self.store(key, packed(found))
+        return found
+
     def load(self, key: str, made: Callable[[Arrays], T]) -> T | None:
         """Make something of the arrays kept under ``key``; None where there are none.
 

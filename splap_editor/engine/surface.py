@@ -14,6 +14,7 @@ from splap_editor.core.graph.carriers import carrying
 from splap_editor.core.graph.options import GRAPH_RULES, LAPLACIANS, NEIGHBORHOODS, GraphOptions
 from splap_editor.core.graph.splat_graph import SplatGraph, require_mendable
 from splap_editor.core.index_spaces import FileMask, RowPair
+from splap_editor.core.kept_arrays import Arrays
 from splap_editor.core.progress import StageProgress, silent
 from splap_editor.core.splats.occupancy import Ellipses, occupancy_ellipses
 from splap_editor.core.splats.splats import Splats
@@ -154,13 +155,7 @@ def surface_of(
     if ellipses is None:
         with timed("occupancy"):
             ellipses = occupancy_ellipses(splats, removed=removed)
-    if ellipses.n_nodes == 0:
-        if ellipses.removed is not None:
-            raise ValueError("every visible splat is removed, so there is no surface to deform: restore some")
-        raise ValueError(
-            "no splat of this file is visible (opacity above 1/255 and a finite size), so there is no surface to "
-            "deform; check the layout it was read with"
-        )
+    _require_visible(ellipses)
     asked, options = options, _without_removed(options, ellipses)
     visible = ellipses
     plain = unmended(options)
@@ -175,12 +170,14 @@ def surface_of(
     if near is not None and near.ellipses is ellipses and unmended(near.options) == plain:
         made = near.stages
     else:
-        kept = None
-        if cache is not None:
-            kept = cache.load(key, lambda arrays: unpacked_stages(arrays, options, ellipses.n_nodes))
-        made = kept or plain_stages(ellipses, options, timed, stages, alone)
-        if cache is not None and kept is None:
-            cache.store(key, packed_stages(made))
+
+        def make() -> SurfaceStages:
+            return plain_stages(ellipses, options, timed, stages, alone)
+
+        def unpacked(arrays: Arrays) -> SurfaceStages:
+            return unpacked_stages(arrays, options, ellipses.n_nodes)
+
+        made = make() if cache is None else cache.kept(key, make, packed_stages, unpacked)
     if made.options != options:
         made = mended_stages(ellipses, made, options, timed, stages, alone)
     if options != plain:
@@ -188,6 +185,17 @@ def surface_of(
     with timed("kernels"):
         binding = KernelBinding(splats, ellipses, made.neighborhoods, graph=made.graph, progress=stages("kernels"))
     return Surface(ellipses, visible, made, binding, key, asked, timings)
+
+
+def _require_visible(ellipses: Ellipses) -> None:
+    if ellipses.n_nodes:
+        return
+    if ellipses.removed is not None:
+        raise ValueError("every visible splat is removed, so there is no surface to deform: restore some")
+    raise ValueError(
+        "no splat of this file is visible (opacity above 1/255 and a finite size), so there is no surface to "
+        "deform; check the layout it was read with"
+    )
 
 
 def _without_removed(options: GraphOptions, ellipses: Ellipses) -> GraphOptions:

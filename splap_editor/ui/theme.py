@@ -106,13 +106,23 @@ def icon_path(name: str) -> str:
 
 def style_sheet() -> str:
     """Style sheet of the whole application."""
+    return "".join((_ground(), _bars(), _input(), _measures(), _own()))
+
+
+def _ground() -> str:
+    """Windows and tool tips."""
     return f"""
     QWidget {{ color: {TEXT}; }}
     QMainWindow, QDialog {{ background: {PANEL}; }}
     QMainWindow::separator {{ background: {GROUND}; width: 4px; height: 4px; }}
     QMainWindow::separator:hover {{ background: {LINE}; }}
     QToolTip {{ background: #111214; color: {TEXT}; border: 1px solid {LINE}; padding: 4px 8px; }}
+    """
 
+
+def _bars() -> str:
+    """Menus and tool bars."""
+    return f"""
     QMenuBar {{ background: {PANEL}; padding: 0 4px; }}
     QMenuBar::item {{ padding: 6px 10px; background: transparent; border-radius: 4px; }}
     QMenuBar::item:selected {{ background: {RAISED}; }}
@@ -136,7 +146,12 @@ def style_sheet() -> str:
     #toolColumn QToolButton {{ padding: 6px; }}
     #headerBar {{ background: {PANEL}; }}
     #headerBar QToolButton {{ padding: 4px 8px; }}
+    """
 
+
+def _input() -> str:
+    """Buttons, fields and what message boxes do with them."""
+    return f"""
     QPushButton {{ background: {RAISED}; border: 1px solid {LINE}; border-radius: 4px;
         padding: 5px 14px; min-height: 16px; }}
     QPushButton:hover {{ background: #38393e; }}
@@ -164,7 +179,12 @@ def style_sheet() -> str:
 
     QDialogButtonBox {{ dialogbuttonbox-buttons-have-icons: 0; }}
     QMessageBox {{ messagebox-text-interaction-flags: 0; }}
+    """
 
+
+def _measures() -> str:
+    """Boxes to tick, sliders, progress and scroll bars."""
+    return f"""
     QCheckBox {{ spacing: 8px; }}
     QCheckBox::indicator {{ width: 14px; height: 14px;
         border: 1px solid {FAINT}; border-radius: 3px; background: {FIELD}; }}
@@ -189,7 +209,12 @@ def style_sheet() -> str:
     QScrollBar::add-line, QScrollBar::sub-line, QScrollBar::add-page, QScrollBar::sub-page {{
         background: none; border: 0; width: 0; height: 0;
     }}
+    """
 
+
+def _own() -> str:
+    """Status bar, docks and widgets of our own."""
+    return f"""
     QStatusBar {{ background: {PANEL}; border-top: 1px solid {GROUND}; }}
     QStatusBar::item {{ border: 0; }}
     QDockWidget {{ titlebar-close-icon: none; titlebar-normal-icon: none; }}

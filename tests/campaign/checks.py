@@ -104,35 +104,30 @@ def check_splats(path: Path, number: int) -> bool:
 
 def check_recipe(path: Path, number: int) -> bool:
     """Whether a recipe is accepted; then it is written and read as the same."""
-    try:
-        held = read_recipe(path)
-    except RecipeError as error:
-        assert path.name in str(error), f"no sentence: {error}"
-        return False
-    again = path.with_name("again.json")
-    try:
-        write_recipe(again, held)
-    except RecipeError as error:
-        assert "name that cannot be written" in str(error), error
-        return True
-    assert read_recipe(again) == held
-    return True
+    names = read_recipe, write_recipe, RecipeError, "again.json", "name that cannot be written"
+    return _comes_back(path, *names, same=lambda held, again: held == again)
 
 
 def check_session(path: Path, number: int) -> bool:
     """Whether a session is accepted; then it is written and read as the same."""
+    names = read_session_file, write_session_file, SessionFileError, "again.splap", "name that can be written"
+    return _comes_back(path, *names, same=lambda held, again: held.recipe == again.recipe)
+
+
+def _comes_back(path, read, write, refusal, name, unwritable, *, same) -> bool:
+    """Whether a file is accepted; then what it holds is written and read as the same, unless it cannot be written."""
     try:
-        held = read_session_file(path)
-    except SessionFileError as error:
+        held = read(path)
+    except refusal as error:
         assert path.name in str(error), f"no sentence: {error}"
         return False
-    again = path.with_name("again.splap")
+    again = path.with_name(name)
     try:
-        write_session_file(again, held)
-    except SessionFileError as error:
-        assert "name that can be written" in str(error), error
+        write(again, held)
+    except refusal as error:
+        assert unwritable in str(error), error
         return True
-    assert read_session_file(again).recipe == held.recipe
+    assert same(held, read(again))
     return True
 
 

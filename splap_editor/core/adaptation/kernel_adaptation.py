@@ -15,6 +15,11 @@ from splap_editor.core.splats.rotations import matrices_to_quats, quat_products
 from splap_editor.core.splats.spherical_harmonics import rotated_sh
 from splap_editor.core.splats.splats import Splats
 
+_Floats = NDArray[np.float64]
+_Flags = NDArray[np.bool_]
+_Nodes = tuple[_Floats, _Floats, _Floats, _Flags, float, _Flags]
+"""Rest centres, positions, rotations, which rest, below what shift a node is still, and which have moved."""
+
 
 @dataclass(frozen=True, eq=False)
 class AdaptedKernels:
@@ -188,26 +193,36 @@ def adapt_kernels(
         find_moved(*nodes)
         _move_centers(rest, positions, moved, arrays)
     else:
-        motions, square_shifts = _spare_motions(binding), np.empty(len(positions))
-        carriers, weights = binding.carriers, binding.weights
-        if method == "paper":
-            find_moved(*nodes)
-            carriers, weights = binding.published_carriers
-            motions[:, :9] = np.eye(3).ravel()
-            motions[:, 9:] = np.where(moved[:, None], positions - rest.means[: len(positions)], 0.0)
-            square_shifts = np.square(motions[:, 9:]).sum(axis=1)
-        elif method == "surface":
-            find_motions(binding.stencils, binding.inverse_moments, binding.dampings, *nodes, motions, square_shifts)
-        else:
-            assert binding.graph is not None, "asked for at the door"
-            find_ring_motions(hops, binding.graph.indptr, binding.graph.indices, *nodes, motions, square_shifts)
-            # Each splat carries itself.
-            carriers = np.repeat(np.arange(len(positions), dtype=np.int32)[:, None], 9, axis=1)
-            weights = np.tile(np.array([1.0, 0.0], np.float32), (len(positions), 3))
+        carriers, weights, motions, square_shifts = _carrier_motions(binding, method, hops, nodes)
         write_kernels(carriers, weights, motions, square_shifts, moved, resting, rotations, rest, arrays)
         binding.spare_motions.append(motions)
     adapt_inert(binding.inert_carriers, binding.inert_weights, rest, positions, rotations, moved, arrays)
     return AdaptedKernels(binding, arrays)
+
+
+def _carrier_motions(
+    binding: KernelBinding, method: str, hops: int, nodes: _Nodes
+) -> tuple[NDArray[np.int32], NDArray[np.float32], _Floats, _Floats]:
+    """Nodes that carry the corners of each splat, with their weights; the affine map by which each node moves.
+
+    Says in the last of ``nodes`` which of them have moved; (n,) squares of how far come last.
+    """
+    means, positions, *_, moved = nodes
+    motions, square_shifts = _spare_motions(binding), np.empty(len(positions))
+    if method == "surface":
+        find_motions(binding.stencils, binding.inverse_moments, binding.dampings, *nodes, motions, square_shifts)
+        return binding.carriers, binding.weights, motions, square_shifts
+    if method == "paper":
+        find_moved(*nodes)
+        motions[:, :9] = np.eye(3).ravel()
+        motions[:, 9:] = np.where(moved[:, None], positions - means[: len(positions)], 0.0)
+        return *binding.published_carriers, motions, np.square(motions[:, 9:]).sum(axis=1)
+    assert binding.graph is not None, "asked for at the door"
+    find_ring_motions(hops, binding.graph.indptr, binding.graph.indices, *nodes, motions, square_shifts)
+    # Each splat carries itself.
+    carriers = np.repeat(np.arange(len(positions), dtype=np.int32)[:, None], 9, axis=1)
+    weights = np.tile(np.array([1.0, 0.0], np.float32), (len(positions), 3))
+    return carriers, weights, motions, square_shifts
 
 
 def adapted_splats(splats: Splats, adapted: AdaptedKernels) -> Splats:

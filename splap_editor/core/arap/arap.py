@@ -170,8 +170,7 @@ class ArapDeformer:
         transforms = self._checked(transforms)
         pose = self._held_pose(transforms)
         if self._rigid.follow(transforms, pose):
-            self._loose.follow(pose)
-            return Deformation(pose.positions, pose.rotations, resting=self._resting)
+            return self._settled(pose)
         if self._dragged is None:
             self._dragged = self._approached(transforms, no_progress)
         else:
@@ -217,6 +216,10 @@ class ArapDeformer:
 
     def _finished(self, pose: Pose, transforms: NDArray[np.float64], residual: float, n_iterations: int) -> Deformation:
         self._rigid.follow(transforms, pose)
+        return self._settled(pose, residual, n_iterations)
+
+    def _settled(self, pose: Pose, residual: float = 0.0, n_iterations: int = 0) -> Deformation:
+        """What a pose of all that is held together is; loose parts follow it."""
         self._loose.follow(pose)
         return Deformation(pose.positions, pose.rotations, residual, n_iterations, self._resting)
 

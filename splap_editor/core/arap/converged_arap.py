@@ -48,8 +48,7 @@ class ConvergedArap(ArapDeformer):
         transforms = self._checked(transforms)
         pose = self._held_pose(transforms)
         if self._rigid.follow(transforms, pose):
-            self._loose.follow(pose)
-            return Deformation(pose.positions, pose.rotations, resting=self._resting)
+            return self._settled(pose)
         dragged = self._approached(transforms, part_of(progress, 0.0, 0.3))
         start = self._held_pose(transforms)
         self._spread(dragged, transforms, start)

@@ -29,8 +29,7 @@ class LocalGlobalArap(ArapDeformer):
             problem.place(rows)
         problem.fit_rotations(rows)
         problem.spread(rows, pose)
-        self._loose.follow(pose)
-        return Deformation(pose.positions, pose.rotations, np.inf, self.options.iterations, self._resting)
+        return self._settled(pose, np.inf, self.options.iterations)
 
 
 class LibiglArap(ArapDeformer):
@@ -56,5 +55,4 @@ class LibiglArap(ArapDeformer):
         rows = Pose(pose.positions[problem.nodes], pose.rotations[problem.nodes])
         problem.fit_rotations(rows)
         problem.spread(rows, pose)
-        self._loose.follow(pose)
-        return Deformation(pose.positions, pose.rotations, np.inf, self.options.iterations, self._resting)
+        return self._settled(pose, np.inf, self.options.iterations)

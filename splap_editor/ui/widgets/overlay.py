@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QWidget
 from splap_editor.tools.tool import Hud
 from splap_editor.ui.theme import ACCENT, STEP
 
-SHADE = QColor(16, 17, 19, 190)
+_SHADE = QColor(16, 17, 19, 190)
 
 
 class Overlay(QWidget):
@@ -85,7 +85,7 @@ class Overlay(QWidget):
         width = max(metrics.horizontalAdvance(line) for line in self._hint) + 8 * STEP
         height = metrics.lineSpacing() * len(self._hint) + 5 * STEP
         box = QRectF((self.width() - width) / 2, self.height() - height - 8 * STEP, width, height)
-        self._paint_box(painter, box)
+        paint_box(painter, box)
         painter.setFont(font)
         painter.setPen(QColor("#f2f2f4"))
         painter.drawText(box, Qt.AlignmentFlag.AlignCenter, "\n".join(self._hint))
@@ -97,7 +97,7 @@ class Overlay(QWidget):
         width = max(metrics.horizontalAdvance(line) for line in lines) + 4 * STEP
         height = metrics.lineSpacing() * len(lines) + 2 * STEP
         box = QRectF(3 * STEP, self.height() - height - 3 * STEP, width, height)
-        self._paint_box(painter, box)
+        paint_box(painter, box)
         painter.setPen(QColor("#f2f2f4"))
         text = box.adjusted(2 * STEP, 0, -STEP, 0)
         painter.drawText(text, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, self._hud.text)
@@ -114,11 +114,12 @@ class Overlay(QWidget):
         painter.setPen(QColor("#ffffff"))
         painter.drawText(frame, Qt.AlignmentFlag.AlignCenter, self._drop_text)
 
-    @staticmethod
-    def _paint_box(painter: QPainter, box: QRectF) -> None:
-        path = QPainterPath()
-        path.addRoundedRect(box, 6, 6)
-        painter.fillPath(path, SHADE)
+
+def paint_box(painter: QPainter, box: QRectF) -> None:
+    """Darken the picture behind words."""
+    path = QPainterPath()
+    path.addRoundedRect(box, 6, 6)
+    painter.fillPath(path, _SHADE)
 
 
 def _faded(color: str, alpha: int) -> QColor:
