@@ -50,14 +50,10 @@ def test_every_selection_command_is_undone_by_undo(driver):
     scene.selection[:40] = True
     for name in ("invert", "grow", "shrink", "connected", "none", "all"):
         before = scene.selection.copy()
-        n = driver.session.history.can_undo
         actions[f"select.{name}"].trigger()
-        after = scene.selection.copy()
-        if (after != before).any():
-            actions["edit.undo"].trigger()
-            assert (scene.selection == before).all(), name
-        else:
-            assert driver.session.history.can_undo == n
+        assert (scene.selection != before).any(), name
+        actions["edit.undo"].trigger()
+        assert (scene.selection == before).all(), name
         scene.set_selection(scene.selection.copy())
 
 

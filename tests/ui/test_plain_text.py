@@ -63,7 +63,5 @@ def test_no_label_shows_tags(driver):
 
 def test_labels_and_boxes_are_made_by_one_constructor():
     package = Path(splap_editor.__file__).parent
-    own = package / "ui" / "widgets" / "plain_text.py"
-    for path in package.rglob("*.py"):
-        if path != own:
-            assert not re.search(MADE_ELSEWHERE, path.read_text()), path
+    assert re.search(MADE_ELSEWHERE, "label = QLabel(text)") and len(list(package.rglob("*.py"))) > 100
+    assert [path for path in package.rglob("*.py") if re.search(MADE_ELSEWHERE, path.read_text())] == []

@@ -34,7 +34,9 @@ def test_no_mnemonic_of_the_menu_bar_is_a_shortcut_too(empty_window):
 
 
 def test_no_two_entries_of_a_menu_share_a_mnemonic(empty_window):
-    for menu in empty_window.findChildren(QMenu):
+    menus = empty_window.findChildren(QMenu)
+    assert {menu.title() for menu in menus} >= set(MENUS)
+    for menu in menus:
         found = Counter(QKeySequence.mnemonic(action.text()).toString() for action in menu.actions())
         found.pop("", None)
         assert [keys for keys, n in found.items() if n > 1] == [], menu.title()

@@ -231,6 +231,7 @@ def test_each_part_is_hit_where_it_is_drawn(projection):
     gizmo.attach(frame_at())
     origin, size = gizmo.frame[:3, 3], gizmo.arm_length(projection)
     sight = origin - projection.eye if not projection.is_parallel else projection.direction
+    assert any(gizmo.is_part_shown(square, projection) for square in SQUARES)
     for i in range(3):
         e, f, g = np.roll(np.eye(3), -i, axis=0)
         assert gizmo.hit(projection, *projection.pixel(origin + 0.95 * size * e)) == ARROWS[i]
