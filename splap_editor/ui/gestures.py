@@ -5,33 +5,21 @@ from collections.abc import Iterable, Iterator
 from splap_editor.tools.bindings import Binding, capitalised
 from splap_editor.tools.tool_table import bindings_by_group
 from splap_editor.ui.actions.action_spec import ActionSpec
+from splap_editor.ui.timeline.ruler import TimelineRuler
+from splap_editor.ui.viewport_widget import ViewportWidget
+from splap_editor.ui.widgets.histogram import Histogram
+from splap_editor.ui.widgets.number_field import NumberField, ScrubLabel
+from splap_editor.ui.widgets.widget_gestures import Rows
 
-Rows = tuple[tuple[str, str], ...]
-
-WIDGET_GESTURES: dict[str, Rows] = {
-    "Look around": (("Hold O", "Show the original"),),
-    "Quantities": (
-        ("Drag over the histogram", "Select by value; Shift adds, Ctrl removes"),
-        ("Drag the marks below it", "Ends of the colours; double click resets"),
-    ),
-    "Frames": (
-        ("Drag the line", "Look at a frame"),
-        ("Drag a diamond, Esc", "Move a key, drop it where it was"),
-        ("Right click on a diamond", "Delete the key"),
-    ),
-    "Numbers": (
-        ("Drag a label sideways", "Change the number; Shift finely"),
-        ("Return, Esc", "Take it, leave it: the keys are the picture's again"),
-    ),
-}
-"""Gestures of single widgets, beside those of the tools."""
+WIDGETS = (ViewportWidget, Histogram, TimelineRuler, ScrubLabel, NumberField)
+"""Kinds of widgets with gestures of their own, beside those of the tools."""
 
 
 def key_blocks(specs: Iterable[ActionSpec]) -> dict[str, Rows]:
     """Keys and what they do, by title: tools, widgets, then the menus."""
     blocks = {title: tuple(_rows(bindings)) for title, bindings in bindings_by_group().items()}
-    for title, rows in WIDGET_GESTURES.items():
-        blocks[title] = (*blocks.get(title, ()), *rows)
+    for group, rows in (kind.gestures for kind in WIDGETS):
+        blocks[group] = (*blocks.get(group, ()), *rows)
     for spec in specs:
         if spec.shortcuts:
             title = f"{spec.menu.split('/')[0].replace('&', '')} menu"

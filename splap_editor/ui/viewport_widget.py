@@ -23,6 +23,7 @@ from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QLineEdit, QWidget
 from pyvistaqt import QtInteractor
 
 from splap_editor.tools.tool import KeyEvent, PointerEvent
+from splap_editor.ui.widgets.widget_gestures import WidgetGestures
 
 BUTTONS = {
     Qt.MouseButton.LeftButton: "left",
@@ -48,6 +49,8 @@ class ViewportWidget(QtInteractor):
     does the one render, by a call that lets other threads run. VTK's own
     mouse and key bindings never see an event.
     """
+
+    gestures = WidgetGestures("Look around", ((f"Hold {COMPARE_KEY}", "Show the original"),))
 
     frame_drawn = Signal(float)
     """A frame is on its way to the screen; the milliseconds its render took."""

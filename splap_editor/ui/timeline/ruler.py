@@ -6,6 +6,7 @@ from PySide6.QtWidgets import QMenu, QSizePolicy, QWidget
 
 from splap_editor.core.timeline import Timeline
 from splap_editor.ui.theme import ACCENT, FAINT, FIELD, LINE, QUIET, STEP, TEXT
+from splap_editor.ui.widgets.widget_gestures import WidgetGestures
 
 MARGIN = 4 * STEP
 LABEL_PX = 56
@@ -21,6 +22,15 @@ class TimelineRuler(QWidget):
     the end; ``key_moved(frame, to)`` when a diamond is let go elsewhere,
     ``key_deleted(frame)`` from its menu.
     """
+
+    gestures = WidgetGestures(
+        "Frames",
+        (
+            ("Drag the line", "Look at a frame"),
+            ("Drag a diamond, Esc", "Move a key, drop it where it was"),
+            ("Right click on a diamond", "Delete the key"),
+        ),
+    )
 
     scrubbed = Signal(int)
     chosen = Signal(int)

@@ -7,6 +7,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from splap_editor.session.selection import SelectionMode
 from splap_editor.ui.theme import ACCENT, FAINT, FIELD, LINE, TEXT
+from splap_editor.ui.widgets.widget_gestures import WidgetGestures
 from splap_editor.viewport.quantity_view import ShownQuantity
 
 HANDLE_PX = 6.0
@@ -22,6 +23,14 @@ class Histogram(QWidget):
     ends of the colour map: `range_changed`; a double click there,
     `range_reset`.
     """
+
+    gestures = WidgetGestures(
+        "Quantities",
+        (
+            ("Drag over the histogram", "Select by value; Shift adds, Ctrl removes"),
+            ("Drag the marks below it", "Ends of the colours; double click resets"),
+        ),
+    )
 
     picking = Signal(float, float, object)
     picked = Signal(float, float, object)

@@ -5,6 +5,7 @@ from PySide6.QtGui import QEnterEvent, QKeyEvent, QMouseEvent, QWheelEvent
 from PySide6.QtWidgets import QDoubleSpinBox, QWidget
 
 from splap_editor.ui.widgets.plain_text import PlainLabel
+from splap_editor.ui.widgets.widget_gestures import WidgetGestures
 
 
 class NumberField(QDoubleSpinBox):
@@ -13,6 +14,8 @@ class NumberField(QDoubleSpinBox):
     The wheel is left to the panel unless the field has the focus, so that
     scrolling past it changes nothing.
     """
+
+    gestures = WidgetGestures("Numbers", (("Return, Esc", "Take it, leave it: the keys are the picture's again"),))
 
     committed = Signal(float)
 
@@ -78,6 +81,7 @@ class ScrubLabel(PlainLabel):
     """
 
     PIXELS_PER_STEP = 4
+    gestures = WidgetGestures("Numbers", (("Drag a label sideways", "Change the number; Shift finely"),))
 
     started = Signal()
     moved = Signal(float)
