@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.index_spaces import NodeMask
 from splap_editor.core.progress import Progress, no_progress
 
 PIN = -1
@@ -49,7 +50,7 @@ class Handles:
         """Number of handles H."""
         return len(self.centers)
 
-    def resting(self, n_nodes: int) -> NDArray[np.bool_]:
+    def resting(self, n_nodes: int) -> NodeMask:
         """(n,) nodes that are held at rest: the pins, and what lies outside the free region."""
         is_resting = np.zeros(n_nodes, np.bool_)
         is_resting[self.indices[self.labels < 0]] = True

@@ -10,6 +10,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from splap_editor.core.index_spaces import FileRow
 from splap_editor.core.splats.occupancy import Ellipses
 from splap_editor.core.splats.splats import Splats
 
@@ -59,7 +60,7 @@ class Snapshot:
     handles: Handles | None = None
     weights: Weights | None = None
     handle: int | None = None
-    picked: int | None = None
+    picked: FileRow | None = None
     bare_graph: SplatGraph | None = None
 
     @property

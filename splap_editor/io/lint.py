@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.index_spaces import FileMask, FileRows
 from splap_editor.core.progress import Progress, no_progress
 from splap_editor.core.splats.splats import Splats
 
@@ -41,7 +42,7 @@ class Finding:
 
     kind: str
     sentence: str
-    rows: NDArray[np.int64]
+    rows: FileRows
 
 
 def unusable_rows(splats: Splats, progress: Progress = no_progress) -> list[Finding]:
@@ -123,7 +124,7 @@ def _finite(values: NDArray) -> bool:
     return bool(np.isfinite(values).all())
 
 
-def _add(findings: list[Finding], kind: str, template: str, mask: NDArray[np.bool_]) -> None:
+def _add(findings: list[Finding], kind: str, template: str, mask: FileMask) -> None:
     """Append a finding unless the mask is empty."""
     rows = np.flatnonzero(mask)
     if len(rows):

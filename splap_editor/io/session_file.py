@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from splap_editor.core.index_spaces import FileMask
 from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.timeline import LAST_FRAME, Key, Timeline
 from splap_editor.io.atomic_file import atomic_file
@@ -321,11 +321,11 @@ def _display(value: Any) -> dict[str, Scalar]:
     return dict(value)
 
 
-def _packed(mask: NDArray[np.bool_]) -> str:
+def _packed(mask: FileMask) -> str:
     return base64.b64encode(np.packbits(mask).tobytes()).decode()
 
 
-def _mask(item: JsonObject, key: str, n_splats: int) -> NDArray[np.bool_]:
+def _mask(item: JsonObject, key: str, n_splats: int) -> FileMask:
     """Splats as bits, eight to a byte, in base64."""
     wanted = f"base64 of a bit for each of {n_splats} splats"
     try:

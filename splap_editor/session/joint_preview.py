@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from splap_editor.core.graph.options import Joint, Point
-from splap_editor.core.index_spaces import FileMask, FileRows
+from splap_editor.core.index_spaces import FileMask, FileRow, FileRows, Nodes
 from splap_editor.core.surface.geodesics import geodesic_distances
 from splap_editor.core.surface.joining import facing_rims
 from splap_editor.engine.strokes import joint_contacts
@@ -52,7 +52,7 @@ def default_reach(a: Sequence[Point], b: Sequence[Point]) -> float:
     return reach or 1.0
 
 
-def gap_in(surface: Surface, rows: Sequence[int]) -> int | None:
+def gap_in(surface: Surface, rows: Sequence[FileRow]) -> int | None:
     """Where a stroke over some file rows crosses a gap: the number of rows before it; None if it crosses none."""
     if len(rows) < 2:
         return None
@@ -69,7 +69,7 @@ def gap_in(surface: Surface, rows: Sequence[int]) -> int | None:
     return int(places[np.argmax(apart > (DETOUR - 1.0) * length)])
 
 
-def rims_of(surface: Surface, selection: FileMask) -> tuple[tuple[int, ...], tuple[int, ...]]:
+def rims_of(surface: Surface, selection: FileMask) -> tuple[tuple[FileRow, ...], tuple[FileRow, ...]]:
     """File rows on both sides of the gap between a selection and the rest; for the worker.
 
     Raises
@@ -86,6 +86,6 @@ def rims_of(surface: Surface, selection: FileMask) -> tuple[tuple[int, ...], tup
     return tuple(first), tuple(second)
 
 
-def _spread(rim: np.ndarray) -> np.ndarray:
+def _spread(rim: Nodes) -> Nodes:
     """At most so many places of a rim, evenly along the order of nodes, which is one of space."""
     return rim[np.unique(np.linspace(0, len(rim) - 1, MOST_POINTS).round().astype(int))]

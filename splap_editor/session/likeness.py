@@ -8,7 +8,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from splap_editor.core.graph.splat_graph import SplatGraph
-from splap_editor.core.index_spaces import FileMask, FileRow
+from splap_editor.core.index_spaces import FileMask, FileRow, Node, NodeMask
 from splap_editor.core.options import option
 from splap_editor.core.splats.occupancy import Ellipses
 from splap_editor.core.splats.spherical_harmonics import SH_C0
@@ -112,11 +112,11 @@ def alike(
 
 def flooded(
     graph: SplatGraph,
-    nodes: NDArray[np.bool_],
-    start: int,
+    nodes: NodeMask,
+    start: Node,
     normals: NDArray[np.floating] | None = None,
     angle: float = 90.0,
-) -> NDArray[np.bool_]:
+) -> NodeMask:
     """Spread from a node along the graph, over some of its nodes.
 
     Parameters

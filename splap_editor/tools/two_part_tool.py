@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from splap_editor.core.graph.options import Joint, Point, Separation
+from splap_editor.core.index_spaces import FileRow
 from splap_editor.engine.surface import Surface
 from splap_editor.session.jobs import Job
 from splap_editor.session.latest_job import LatestJob
@@ -55,7 +56,7 @@ class TwoPartTool(Tool):
     def __init__(self, context: ToolContext) -> None:
         super().__init__(context)
         self.parts: tuple[tuple[Point, ...], ...] = ()
-        self.rows: tuple[tuple[int, ...], ...] = ()
+        self.rows: tuple[tuple[FileRow, ...], ...] = ()
         self.found: Any = None
         self._is_shown = False
         self._job = LatestJob(context.session.detail_worker, self.name, failed=self._on_failed)

@@ -2,9 +2,9 @@
 
 from collections.abc import Callable
 
-import numpy as np
 from PySide6.QtWidgets import QWidget
 
+from splap_editor.core.index_spaces import FileRows
 from splap_editor.session.graph_preview import GraphPreview
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
@@ -110,7 +110,7 @@ class Inspection:
         self.graph_view.changed.connect(check)
         check()
 
-    def look_at(self, rows: np.ndarray) -> None:
+    def look_at(self, rows: FileRows) -> None:
         """Fly to some splats, and inspect the first of them."""
         self._fly_to(self._view.viewport.frame(rows))
         self.inspected.pick(int(rows[0]))

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from splap_editor.core.index_spaces import FileMask
 from splap_editor.session.scene import Scene
 from splap_editor.session.selection import connected_selection, grown_selection, rim_selection, shrunk_selection
 from splap_editor.session.session import Session
@@ -81,8 +82,8 @@ class SelectActions:
         """Select what lies behind as well."""
         self._options.set(replace(self._options.value, through=on))
 
-    def _select(self, mask: np.ndarray, label: str) -> None:
+    def _select(self, mask: FileMask, label: str) -> None:
         self._session.steps.change_mask("selection", mask, label)
 
-    def _hide(self, mask: np.ndarray, label: str) -> None:
+    def _hide(self, mask: FileMask, label: str) -> None:
         self._session.steps.change_mask("hidden", mask, label)

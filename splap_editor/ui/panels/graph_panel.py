@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
 
 from splap_editor.core.graph.options import GraphOptions, edges_only
 from splap_editor.core.graph.splat_graph import SplatGraph
+from splap_editor.core.index_spaces import FileRows
 from splap_editor.session.graph_preview import GraphPreview
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
@@ -182,7 +183,7 @@ class GraphPanel(QWidget):
             self.components.addItem(item)
         self.components.setVisible(len(sizes) > 1)
 
-    def _rows_of(self, label: int) -> np.ndarray:
+    def _rows_of(self, label: int) -> FileRows:
         scene = self._session.shown_scene
         graph = self._graph
         return scene.ellipses.rows[graph.components == label] if graph is not None else np.empty(0, np.int64)

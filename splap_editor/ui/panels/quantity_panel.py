@@ -1,6 +1,5 @@
 """Which quantity colours the splats, by which map, and its histogram."""
 
-import numpy as np
 from PySide6.QtWidgets import QCheckBox, QComboBox, QGridLayout, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from splap_editor.core.index_spaces import FileMask
@@ -25,7 +24,7 @@ class QuantityPanel(QWidget):
         super().__init__(parent)
         self._session = session
         self._view = view
-        self._before: np.ndarray | None = None
+        self._before: FileMask | None = None
         self.choice = Choice(toolTip="Colour the splats by this number")
         self.choice.addItem("Own colours", "")
         for name, quantity in QUANTITIES.items():
