@@ -5,6 +5,7 @@ import os
 import sys
 import traceback
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 
@@ -124,6 +125,7 @@ def make_window(cache: StageCache | None = None) -> MainWindow:
     documents = Documents(session, mailbox.post)
     autosave = Autosave(documents, mailbox.post)
     context = ToolContext(session, viewport, InspectView(session, view))
+    context.paint = partial(view.paint, layer="tool")
     tools = made_tools(context)
     widget.connect_tools(tools.pointer, tools.key)
     window = MainWindow(session, documents, autosave, widget, view, context, tools, Display())

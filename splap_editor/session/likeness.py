@@ -39,7 +39,7 @@ class LikenessOptions:
         most=1.0,
         is_percent=True,
         step=0.01,
-        decimals=0,
+        decimals=2,
     )
     size: float = option(
         100.0,

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Generic, Protocol, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from splap_editor.session.session import Session
 from splap_editor.session.signals import Signal
@@ -147,6 +148,8 @@ class ToolContext:
         ``orbit(press)`` begins a stroke of the camera: what a drag becomes that no tool wants.
     fly_to : callable
         Brings the camera to a view; a host that can animate it says how.
+    paint : callable
+        Lays colours (N, 4) uint8, the fourth their share, over the splats; None takes them off again.
     left_orbits : bool
         A left drag without Shift or Ctrl is one too, except where it draws.
     """
@@ -157,6 +160,7 @@ class ToolContext:
     hud: Hud = field(default_factory=Hud)
     orbit: Callable[[PointerEvent], Stroke | None] = lambda press: None
     fly_to: Callable[[View], None] = field(init=False)
+    paint: Callable[[NDArray[np.uint8] | None], None] = lambda colors: None
     left_orbits: bool = False
     _held: dict[type, Held] = field(default_factory=dict)
 

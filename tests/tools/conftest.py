@@ -1,6 +1,7 @@
 """Tools off screen: a session, a viewport that shows it, and a hand that tells tools what it does. No Qt."""
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 import pytest
@@ -112,7 +113,9 @@ def hand(stages, no_leaked_vtk, request) -> Iterator[Hand]:
     window.SetSize(600, 400)
     viewport = Viewport(window)
     view = SceneView(session, viewport)
-    tools = made_tools(ToolContext(session, viewport, InspectView(session, view)))
+    context = ToolContext(session, viewport, InspectView(session, view))
+    context.paint = partial(view.paint, layer="tool")
+    tools = made_tools(context)
     person = Hand(tools, main)
     session.open(resource("samples", "tube.ply"))
     person.settle()

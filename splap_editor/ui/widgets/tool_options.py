@@ -11,6 +11,7 @@ from splap_editor.tools.tool_manager import ToolManager
 from splap_editor.tools.tool_table import TOOLS
 from splap_editor.ui.actions.actions import ActionSet
 from splap_editor.ui.theme import STEP
+from splap_editor.ui.widgets.choices import Choice
 from splap_editor.ui.widgets.number_field import NumberField, ScrubLabel
 from splap_editor.ui.widgets.options_form import FieldHint, hints_of
 from splap_editor.ui.widgets.plain_text import PlainLabel
@@ -89,6 +90,15 @@ class HeldForm(QWidget):
             switch.toggled.connect(lambda on: self._take(name, on))
             row.addWidget(switch)
             return switch
+        if hint.choices:
+            choice = Choice()
+            for value, text in hint.choices.items():
+                choice.addItem(text, value)
+            choice.setToolTip(hint.tip)
+            choice.setAccessibleName(hint.label)
+            choice.activated.connect(lambda index: self._take(name, choice.itemData(index)))
+            row.addWidget(choice)
+            return choice
         field = NumberField(hint.low, hint.high, decimals=hint.decimals, step=hint.step, unit=hint.unit)
         field.setToolTip(hint.tip)
         field.setFixedWidth(64)
@@ -107,6 +117,8 @@ class HeldForm(QWidget):
             value = getattr(self._held.value, name)
             if isinstance(editor, QCheckBox):
                 editor.setChecked(value)
+            elif isinstance(editor, Choice):
+                editor.setCurrentIndex(editor.findData(value))
             elif isinstance(editor, NumberField):
                 editor.show_value(self._hints[name].factor * value)
 
