@@ -2,23 +2,16 @@
 
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from splap_editor.core.graph.splat_graph import GraphOptions, SplatGraph
 from splap_editor.core.index_spaces import FileMask, FileRows, RowPair
 from splap_editor.core.splats.occupancy import Ellipses
-from splap_editor.core.surface.joining import best_contacts, contact_order, near_pairs
-
-FRAGMENT_SHARE = 0.01
-"""A component of at most such a share of all nodes is a fragment, if it is not the largest."""
-
-JOIN_REACH = 3.0
-"""A fragment is joined where centres are no farther apart than so many times both reaches together."""
-
-N_LINKS = 3
-"""Best contacts by which a fragment is tied: one alone would let it turn freely."""
+from splap_editor.core.splats.spherical_harmonics import SH_C0
+from splap_editor.core.splats.splats import Splats
+from splap_editor.core.surface.fragments import fragment_contacts
 
 
 def with_cut(options: GraphOptions, pairs: Iterable[RowPair]) -> GraphOptions:
@@ -43,69 +36,27 @@ def edges_between(ellipses: Ellipses, graph: SplatGraph, first: FileMask, second
     return _as_pairs(rows[crossing])
 
 
-def best_links(ellipses: Ellipses, epsilon: float, first: FileMask, second: FileMask) -> list[RowPair]:
-    """Contacts by which two selections are best joined.
-
-    See `best_contacts`.
+class FragmentLinks(NamedTuple):
+    """Contacts that tie fragments, and what becomes of each.
 
     Parameters
     ----------
-    ellipses : Ellipses
-    epsilon : float
-        Tolerance in units of the scene scale.
-    first, second : (N,) bool
-        Over file rows; what both have belongs to the first.
-
-    Returns
-    -------
-    list of RowPair
-        File rows; empty if a side has no active splat.
-    """
-    a = np.flatnonzero(first[ellipses.rows])
-    b = np.flatnonzero((second & ~first)[ellipses.rows])
-    return _as_pairs(ellipses.rows[best_contacts(ellipses, a, b, epsilon * ellipses.scene_scale)])
-
-
-def fragments(graph: SplatGraph) -> NDArray[np.int64]:
-    """Labels of the components that are small beside the whole, ascending; never the largest."""
-    sizes = np.bincount(graph.components) if graph.n_nodes else np.zeros(0, np.int64)
-    small = np.flatnonzero(sizes <= max(FRAGMENT_SHARE * graph.n_nodes, 1.0))
-    return small[small > 0]
-
-
-def fragment_links(ellipses: Ellipses, graph: SplatGraph, epsilon: float) -> tuple[list[RowPair], int]:
-    """Contacts that tie each fragment to what is around it.
-
-    Parameters
-    ----------
-    ellipses : Ellipses
-    graph : SplatGraph
-    epsilon : float
-        Tolerance in units of the scene scale.
-
-    Returns
-    -------
     pairs : list of RowPair
-        File rows: up to three best contacts of each fragment with components that are none.
-    n_left : int
-        Fragments too far from everything to be joined.
+    n_tied, n_far, n_unlike : int
+        See `FragmentContacts`.
     """
-    small = fragments(graph)
-    is_small = np.isin(graph.components, small)
-    a, b = np.flatnonzero(is_small), np.flatnonzero(~is_small)
-    if not len(a) or not len(b):
-        return [], len(small)
-    pairs = near_pairs(ellipses, a, b)
-    apart = np.linalg.norm(ellipses.centers[pairs[:, 0]] - ellipses.centers[pairs[:, 1]], axis=1)
-    pairs = pairs[apart <= JOIN_REACH * ellipses.reaches[pairs].sum(axis=1)]
-    pairs = pairs[contact_order(ellipses, pairs, epsilon * ellipses.scene_scale)]
-    owners = graph.components[pairs[:, 0]]
-    # Rank within the fragment: pairs are in order of contact, and a stable sort keeps that for each owner.
-    order = np.argsort(owners, kind="stable")
-    starts = np.flatnonzero(np.diff(owners[order], prepend=-1))
-    ranks = np.arange(len(order)) - np.repeat(starts, np.diff(np.append(starts, len(order))))
-    chosen = order[ranks < N_LINKS]
-    return _as_pairs(ellipses.rows[pairs[chosen]]), len(small) - len(starts)
+
+    pairs: list[RowPair]
+    n_tied: int
+    n_far: int
+    n_unlike: int
+
+
+def fragment_links(splats: Splats, ellipses: Ellipses, graph: SplatGraph) -> FragmentLinks:
+    """Contacts that tie each fragment that looks like a piece of the surface: see `fragment_contacts`."""
+    colors = 0.5 + SH_C0 * np.asarray(splats.sh0, np.float64)[ellipses.rows]
+    found = fragment_contacts(ellipses, graph, colors)
+    return FragmentLinks(_as_pairs(ellipses.rows[found.pairs]), found.n_tied, found.n_far, found.n_unlike)
 
 
 def _as_pairs(rows: FileRows) -> list[RowPair]:

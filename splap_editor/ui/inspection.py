@@ -84,7 +84,7 @@ class Inspection:
         self.quantity_panel = QuantityPanel(session, self.quantities)
         self.inspect_panel = InspectPanel(session, self.inspected, self.edge_preview)
         self.inspect_panel.edge_toggled.connect(self.graph_actions.toggle_edge)
-        self.graph_panel = GraphPanel(session, self.graph_view, self.preview, self.graph_actions)
+        self.graph_panel = GraphPanel(session, self.graph_view, self.preview)
         self.graph_panel.component_chosen.connect(self.look_at)
         self.panels: tuple[tuple[str, QWidget], ...] = (
             ("Quantities", self.quantity_panel),
@@ -98,7 +98,6 @@ class Inspection:
         SceneFollower(session, self.probe.cancel, picked_changed=self._on_picked)
         self._tools.chosen_changed.connect(self._on_tool_chosen)
         self.inspected.changed.connect(self.changed.emit)
-        self.graph_actions.kept_changed.connect(self.changed.emit)
 
     def set_actions(self, actions: ActionSet) -> None:
         """Give the panels the actions they have buttons for, and keep their marks right."""

@@ -31,8 +31,6 @@ ELSEWHERE = {
     "edit.resume": "test_jobs_and_leaving",
     "display.weights": "test_weights",
     "graph.cut_edge": "test_inspect",
-    "graph.cut_between": "test_graph",
-    "graph.join": "test_graph",
     "graph.join_fragments": "test_graph",
     "graph.clear_mends": "test_graph",
 }
@@ -48,7 +46,7 @@ def seen(driver):
         scene.shown_edit,
         (scene.active_handles, scene.active_pins, scene.pivot),
         (scene.selection.tobytes(), scene.hidden.tobytes(), tuple(scene.selection_sets)),
-        (window.display.options, window.inspection.graph_view.options, id(window.inspection.graph_actions.kept)),
+        (window.display.options, window.inspection.graph_view.options),
         (window.tools.chosen.name, window.toast.text, window.view.viewport.gizmo.is_local),
         tuple(np.round([*view.position, *view.focal_point, *view.view_up], 9)),
         (view.is_parallel, camera.is_turntable, tuple(camera.world_up)),

@@ -4,15 +4,14 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
+from scipy.spatial.transform import Rotation
 
 from splap_editor.core.graph.splat_graph import GraphOptions, splat_graph
-from splap_editor.core.splats.splats import Splats
+from splap_editor.core.surface.fragments import fragments
 from splap_editor.io.recipe import read_recipe
 from splap_editor.io.sample_maker import write_sample
 from splap_editor.session.cards import has_edge
-from splap_editor.session.edit_file import write_edit
-from splap_editor.session.mends import fragments
-from tests.core.splat_scenes import joined, sheet
+from tests.core.splat_scenes import joined, moved, sheet
 
 WAIT_MS = 60_000
 
@@ -114,41 +113,44 @@ def test_the_cards_button_joins_what_it_cut(driver, inspected_edge):
     assert scene.edit.graph == GraphOptions()
 
 
-def test_two_selections_are_cut_apart_and_joined_again_and_the_edit_keeps_it(driver, tmp_path):
-    actions, scene, surface = driver.window.actions_, driver.scene, driver.scene.surface
-    low, high = halves(driver)
-    assert not actions["graph.cut_between"].isEnabled()
+def test_selections_are_separated_and_joined_again_by_the_tools_and_the_edit_keeps_it(driver, tmp_path):
+    scene, surface, tools = driver.scene, driver.scene.surface, driver.window.tools
+    low, _ = halves(driver)
+    driver.window.actions_["tool.separate"].trigger()
     select(driver, low)
-    actions["graph.keep_selection"].trigger()
-    select(driver, high)
-    assert actions["graph.cut_between"].isEnabled()
-    actions["graph.cut_between"].trigger()
+    driver.key(Qt.Key.Key_Return)
     wait_remade(driver, surface)
     assert scene.surface.graph.components.max() == 1
     assert not driver.window.inspection.graph_panel.components.isHidden()
     cut = scene.surface
-    actions["graph.join"].trigger()
+    driver.window.actions_["tool.join"].trigger()
+    driver.key(Qt.Key.Key_Return)
+    driver.qtbot.waitUntil(lambda: tools.chosen.found is not None, timeout=WAIT_MS)
+    assert "Return joins" in tools.context.hud.text
+    driver.key(Qt.Key.Key_BracketRight)
+    driver.qtbot.waitUntil(lambda: tools.chosen.found is not None, timeout=WAIT_MS)
+    driver.key(Qt.Key.Key_Return)
     wait_remade(driver, cut)
     assert scene.surface.graph.components.max() == 0
     path = tmp_path / "edit.json"
-    write_edit(path, driver.scene)
-    assert read_recipe(path).options[GraphOptions].cut == scene.edit.graph.cut
-    actions["graph.clear_mends"].trigger()
+    driver.session.save_edit(path)
+    kept = read_recipe(path).options[GraphOptions]
+    assert (kept.cut, kept.join) == (scene.edit.graph.cut, scene.edit.graph.join) and len(kept.join) == 1
+    driver.window.actions_["graph.clear_mends"].trigger()
     driver.qtbot.waitUntil(lambda: scene.surface.options == GraphOptions(), timeout=WAIT_MS)
     assert scene.surface.graph.n_edges == surface.graph.n_edges
     driver.wait_idle()
 
 
 def test_fragments_are_listed_looked_at_and_joined_in_one_step(driver, tmp_path):
-    whole, speck = sheet(900, seed=1), sheet(900, seed=2)
-    rows = np.argsort(np.linalg.norm(speck.means - [0.5, 0.5, 0.0], axis=1))[:3]
-    names = ("log_scales", "quats", "logit_opacities", "sh0", "shN")
-    picked = {name: np.asarray(getattr(speck, name))[rows] for name in names}
-    write_sample(tmp_path / "speck.ply", joined(whole, Splats(speck.means[rows] + np.array([0.0, 0.0, 0.2]), **picked)))
-    driver.open(tmp_path / "speck.ply")
+    piece = moved(sheet(16, size=0.13, seed=2), Rotation.identity(), 1.0, np.array([1.16, 0.4, 0.0]))
+    floating = moved(sheet(9, size=0.1, seed=3), Rotation.identity(), 1.0, np.array([0.5, 0.5, 0.6]))
+    write_sample(tmp_path / "pieces.ply", joined(sheet(900, seed=1), piece, floating))
+    driver.open(tmp_path / "pieces.ply")
     driver.wait_idle()
     scene, inspection = driver.scene, driver.window.inspection
-    assert len(fragments(scene.surface.graph)) > 0
+    n = len(fragments(scene.surface.graph))
+    assert n == 2
     view = driver.window.view.viewport.camera.view
     listed = inspection.graph_panel.components
     listed.itemClicked.emit(listed.item(1))
@@ -156,8 +158,10 @@ def test_fragments_are_listed_looked_at_and_joined_in_one_step(driver, tmp_path)
     assert scene.surface.graph.components[scene.ellipses.node_of_row[scene.picked]] == 1
     surface = scene.surface
     driver.window.actions_["graph.join_fragments"].trigger()
+    said = driver.window.toast.text
+    assert said.startswith("Joined 1 fragment by") and "Left on purpose: 1 too far from everything" in said
     wait_remade(driver, surface)
-    assert len(fragments(scene.surface.graph)) == 0 and driver.session.history.undo_label == "Join fragments"
+    assert len(fragments(scene.surface.graph)) == 1 and driver.session.history.undo_label == "Join fragments"
 
 
 def test_another_gap_is_previewed_and_changes_nothing_before_apply(driver):

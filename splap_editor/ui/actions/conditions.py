@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from splap_editor.core.graph.splat_graph import SplatGraph
+from splap_editor.core.surface.fragments import fragments
 from splap_editor.session.cards import has_edge as is_joined
-from splap_editor.session.mends import fragments
 from splap_editor.session.scene import Scene
 from splap_editor.session.session import Session
 from splap_editor.ui.actions.graph_actions import GraphActions
@@ -18,7 +18,7 @@ class State:
     ----------
     session : Session
     graph : GraphActions
-        Holds side A, and what is inspected.
+        Holds what is inspected.
     """
 
     session: Session
@@ -145,11 +145,6 @@ def has_edge(state: State) -> bool:
     """The inspected edge joins its splats."""
     scene, graph, edge = state.scene, state.splat_graph, state.graph.inspected.edge
     return scene is not None and graph is not None and edge is not None and is_joined(scene.ellipses, graph, edge)
-
-
-def has_side_a(state: State) -> bool:
-    """One selection is kept as side A, and there is another."""
-    return has_selection_on_surface(state) and state.graph.kept is not None
 
 
 def has_fragments(state: State) -> bool:

@@ -3,24 +3,17 @@
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
-import numpy as np
-
 from splap_editor.core.graph.splat_graph import GraphOptions
-from splap_editor.core.index_spaces import FileMask
 from splap_editor.core.presets import PRESETS, with_preset
 from splap_editor.session.cards import has_edge
-from splap_editor.session.mends import best_links, edges_between, fragment_links, fragments, with_added, with_cut
-from splap_editor.session.scene_follower import SceneFollower
+from splap_editor.session.mends import fragment_links, with_added, with_cut
 from splap_editor.session.session import Session
-from splap_editor.session.signals import Signal
 from splap_editor.viewport.graph_view import SHOWN, GraphView
 from splap_editor.viewport.inspect_view import InspectView
 
 
 class GraphActions:
     """Cuts and joins; each is one undoable step of the edit.
-
-    `kept_changed` tells that another selection is kept as side A.
 
     Parameters
     ----------
@@ -34,13 +27,10 @@ class GraphActions:
     def __init__(
         self, session: Session, graph_view: GraphView, inspected: InspectView, say: Callable[[str], None]
     ) -> None:
-        self.kept: FileMask | None = None
-        self.kept_changed = Signal()
         self._session = session
         self._graph_view = graph_view
         self.inspected = inspected
         self._say = say
-        SceneFollower(session, self._forget)
 
     # Edges in view ------------------------------------------------------------------------------------------------
 
@@ -86,46 +76,18 @@ class GraphActions:
         else:
             self._change(with_added(self._options, [edge]), "Add edge")
 
-    def keep_selection(self) -> None:
-        """Remember the selection as side A."""
-        self.kept = self._session.shown_scene.selection.copy()
-        self._say(f"Side A: {np.count_nonzero(self.kept):,} splats. Select side B, then cut or join.")
-        self.kept_changed.emit()
-
-    def cut_between(self) -> None:
-        """Cut all edges between side A and the selection."""
-        scene, kept = self._session.shown_scene, self.kept
-        if kept is None:
-            return
-        pairs = edges_between(scene.ellipses, scene.prepared.graph, kept, scene.selection & ~kept)
-        if not pairs:
-            self._say("No edge joins side A and the selection.")
-            return
-        self._cut(pairs, "Cut between selections")
-        self._say(f"Cut {_counted(len(pairs), 'edge')}.")
-
-    def join(self) -> None:
-        """Join side A and the selection by their best contacts."""
-        scene, kept = self._session.shown_scene, self.kept
-        if kept is None:
-            return
-        pairs = best_links(scene.ellipses, self._options.epsilon, kept, scene.selection)
-        new = [pair for pair in pairs if not has_edge(scene.ellipses, scene.prepared.graph, pair)]
-        if not new:
-            self._say("Their best contacts are joined already." if pairs else "Side A or B has no splat to join.")
-            return
-        self._change(with_added(self._options, new), "Join selections")
-        self._say(f"Joined by {_counted(len(new), 'edge')}.")
-
     def join_fragments(self) -> None:
-        """Tie every fragment to what is around it."""
+        """Tie every fragment that looks like a piece of the surface to what is around it."""
         scene = self._session.shown_scene
-        pairs, n_left = fragment_links(scene.ellipses, scene.prepared.graph, self._options.epsilon)
-        n = len(fragments(scene.prepared.graph)) - n_left
-        left = f" {_counted(n_left, 'fragment')} too far away to join." if n_left else ""
-        if pairs:
-            self._change(with_added(self._options, pairs), "Join fragments")
-        self._say(f"Joined {_counted(n, 'fragment')} by {_counted(len(pairs), 'edge')}.{left}")
+        links = fragment_links(scene.splats, scene.ellipses, scene.prepared.graph)
+        if links.pairs:
+            self._change(with_added(self._options, links.pairs), "Join fragments")
+        said = [f"Joined {_counted(links.n_tied, 'fragment')} by {_counted(len(links.pairs), 'contact')}."]
+        why = ((links.n_far, "too far from everything"), (links.n_unlike, "unlike what is near"))
+        left = " and ".join(f"{n:,} {reason}" for n, reason in why if n)
+        if left:
+            said.append(f"Left on purpose: {left}. The Join tool ties what belongs there all the same.")
+        self._say(" ".join(said))
 
     def clear_mends(self) -> None:
         """Take all cuts and additions back."""
@@ -144,10 +106,6 @@ class GraphActions:
 
     def _change(self, options: GraphOptions, label: str) -> None:
         self._session.steps.change_edit(self._session.shown_scene.edit.with_options(options), label)
-
-    def _forget(self) -> None:
-        self.kept = None
-        self.kept_changed.emit()
 
 
 def _counted(n: int, noun: str) -> str:

@@ -24,7 +24,6 @@ from splap_editor.session.graph_preview import GraphPreview
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.ui.actions.actions import ActionSet
-from splap_editor.ui.actions.graph_actions import GraphActions
 from splap_editor.ui.theme import STEP
 from splap_editor.ui.widgets.number_field import set_tone
 from splap_editor.ui.widgets.options_form import FieldHint, OptionsForm
@@ -52,14 +51,12 @@ class GraphPanel(QWidget):
         session: Session,
         view: GraphView,
         preview: GraphPreview,
-        mending: GraphActions,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
         self._session = session
         self._view = view
         self._preview = preview
-        self._mending = mending
         self._wanted: GraphOptions | None = None
         self._listed: SplatGraph | None = None
         self._segments = QHBoxLayout()
@@ -86,7 +83,6 @@ class GraphPanel(QWidget):
         self._add_parts()
         view.changed.connect(self._show_view)
         preview.changed.connect(self._show_estimate)
-        mending.kept_changed.connect(self._show_mends)
         SceneFollower(session, self._on_scene_changed, surface_changed=self._show, edit_changed=self._show)
         self._show()
 
@@ -94,7 +90,7 @@ class GraphPanel(QWidget):
         """Make the buttons that perform actions."""
         for name in ("off", "near", "all"):
             self._segments.addWidget(_action_button(actions, f"graph.{name}"), 1)
-        names = ("keep_selection", "cut_between", "join", "join_fragments", "clear_mends")
+        names = ("join_fragments", "clear_mends")
         for k, name in enumerate(names):
             self._buttons.addWidget(_action_button(actions, f"graph.{name}"), k // 2, k % 2)
 
@@ -195,8 +191,6 @@ class GraphPanel(QWidget):
         for n, did in ((len(options.separate), "separated"), (len(options.join), "joined")):
             if n:
                 words += f"{'; ' if words else ''}{did} by {n:,} stroke{'' if n == 1 else 's'}"
-        if self._mending.kept is not None:
-            words += f"{'; s' if words else 'S'}ide A has {np.count_nonzero(self._mending.kept):,} splats"
         self.mends.setText(words)
         self.mends.setVisible(bool(words))
 
