@@ -11,6 +11,7 @@ from splap_editor.core.surface.fragments import fragments
 from splap_editor.io.recipe import read_recipe
 from splap_editor.io.sample_maker import write_sample
 from splap_editor.session.cards import has_edge
+from splap_editor.session.edit_file import write_edit
 from tests.core.splat_scenes import joined, moved, sheet
 
 WAIT_MS = 60_000
@@ -133,7 +134,7 @@ def test_selections_are_separated_and_joined_again_by_the_tools_and_the_edit_kee
     wait_remade(driver, cut)
     assert scene.surface.graph.components.max() == 0
     path = tmp_path / "edit.json"
-    driver.session.save_edit(path)
+    write_edit(path, driver.scene)
     kept = read_recipe(path).options[GraphOptions]
     assert (kept.cut, kept.join) == (scene.edit.graph.cut, scene.edit.graph.join) and len(kept.join) == 1
     driver.window.actions_["graph.clear_mends"].trigger()
