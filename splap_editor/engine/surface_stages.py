@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from splap_editor.core.graph.options import NEIGHBORHOODS, GraphOptions
+from splap_editor.core.graph.options import LAPLACIANS, NEIGHBORHOODS, GraphOptions
 from splap_editor.core.graph.splat_graph import SplatGraph, mended_graph, splat_graph
 from splap_editor.core.index_spaces import Nodes, RowPair
 from splap_editor.core.kept_arrays import Arrays, require_array, require_rows
@@ -107,17 +107,23 @@ def mended_stages(
         graph = before.unmended if is_plain else mended_graph(ellipses, before.unmended, mends)
         progress(0.2)
         ends = _changed_ends(ellipses, before.mends, mends)
+        stale: Nodes | None = None
         with alone(progress):
             row = NEIGHBORHOODS[options.neighborhood]
             if row.mended:
-                neighborhoods, nodes = loaded(row.mended)(graph, before.neighborhoods, ends, options.k)
-                triangles = mended_triangulations(ellipses, neighborhoods, before.triangles, nodes)
+                neighborhoods, stale = loaded(row.mended)(graph, before.neighborhoods, ends, options.k)
+                triangles = mended_triangulations(ellipses, neighborhoods, before.triangles, stale)
             else:
                 neighborhoods = row.load()(ellipses, graph, options.k, progress)
                 triangles = local_triangulations(ellipses, neighborhoods)
         progress(0.5)
     with timed("laplacian"):
-        L, M = point_cloud_laplacian(ellipses.centers, triangles, graph=graph, method=options.laplacian)
+        mended = LAPLACIANS[options.laplacian].mended
+        if mended and stale is not None:
+            were = before.triangles, before.L, before.M
+            L, M = loaded(mended)(ellipses.centers, triangles, graph, stale, *were)
+        else:
+            L, M = point_cloud_laplacian(ellipses.centers, triangles, graph=graph, method=options.laplacian)
     return SurfaceStages(options, before.unmended, graph, neighborhoods, triangles, L, M, mends)
 
 

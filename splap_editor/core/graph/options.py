@@ -34,37 +34,37 @@ CARRIERS = {
 
 
 @dataclass(frozen=True)
-class Neighborhood(Choice):
-    """A row of the table of neighbourhoods.
+class MendedChoice(Choice):
+    """A row of the table of neighbourhoods, or of Laplacians.
 
     Parameters
     ----------
     mended : str
-        ``"module:name"`` of what brings them up to date after edges were cut or added, see `mended_neighborhoods`;
-        without it all are found again.
+        ``"module:name"`` of what brings them up to date after edges were cut or added, see `mended_neighborhoods` and
+        `mended_star_laplacian`; without it all is made again.
     """
 
     mended: str = ""
 
 
 NEIGHBORHOODS = {
-    "geodesic": Neighborhood(
+    "geodesic": MendedChoice(
         "Along the surface",
         "The k nearest by shortest path on the graph.",
         "splap_editor.core.surface.neighborhoods:nearest_along_surface",
         mended="splap_editor.core.surface.geodesics:mended_neighborhoods",
     ),
-    "edges": Neighborhood(
+    "edges": MendedChoice(
         "Joined by an edge",
         "Those that an edge of the graph leads to, however many.",
         "splap_editor.core.surface.neighborhoods:joined_by_edges",
     ),
-    "space": Neighborhood(
+    "space": MendedChoice(
         "In space",
         "The k nearest centres, whatever lies between.",
         "splap_editor.core.surface.neighborhoods:nearest_in_space",
     ),
-    "mahalanobis": Neighborhood(
+    "mahalanobis": MendedChoice(
         "By Mahalanobis",
         "The k nearest as each splat's own ellipse measures, a tenth as thick as it is narrow.",
         "splap_editor.core.surface.neighborhoods:nearest_by_mahalanobis",
@@ -73,12 +73,13 @@ NEIGHBORHOODS = {
 """Neighbourhoods by name: ``neighbors(ellipses, graph, k, progress)`` gives `Neighborhoods`."""
 
 LAPLACIANS = {
-    "stars": Choice(
+    "stars": MendedChoice(
         "Cotangents of the stars",
         "Cotangents of the local Delaunay stars, summed.",
         "splap_editor.core.surface.laplacian:star_weights",
+        mended="splap_editor.core.surface.laplacian:mended_star_laplacian",
     ),
-    "robust": Choice(
+    "robust": MendedChoice(
         "Intrinsic Delaunay",
         "Intrinsic Delaunay weights of the stars' union as one non-manifold mesh.",
         "splap_editor.core.surface.laplacian:robust_weights",

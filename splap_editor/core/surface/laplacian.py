@@ -81,6 +81,63 @@ def point_cloud_laplacian(
     return _laplacian_of(weights), _floored(masses, graph)
 
 
+def mended_star_laplacian(
+    centers: NDArray[np.float64],
+    triangles: NDArray[np.integer],
+    graph: SplatGraph,
+    nodes: NDArray[np.integer],
+    triangles_before: NDArray[np.integer],
+    L_before: sp.csr_array,
+    M_before: NDArray[np.float64],
+) -> tuple[sp.csr_array, NDArray[np.float64]]:
+    """Bring Laplacian and masses up to date after some stars changed: to the bit what `point_cloud_laplacian` gives.
+
+    The weight of an edge sums the triangles at it in their order, and stands
+    where no triangle at one of its ends has changed. What stands in for
+    triangles is chosen again; so is the floor of the masses.
+
+    Parameters
+    ----------
+    centers : (n, 3) float64
+    triangles : (T, 3) int
+        All stars, after the change.
+    graph : SplatGraph
+        After the change.
+    nodes : (m,) int
+        Those whose stars were made again.
+    triangles_before, L_before, M_before
+        All of them from before the change, by the method ``stars``.
+    """
+    if not len(triangles) or not len(triangles_before):
+        return point_cloud_laplacian(centers, triangles, graph=graph)
+    n = len(centers)
+    is_stale, touched = np.zeros(n, bool), np.zeros(n, bool)
+    is_stale[nodes] = True
+    for each in (triangles_before, triangles):
+        touched[each[is_stale[each[:, 0]]]] = True
+    starts = np.repeat(np.arange(n, dtype=np.int32), np.diff(L_before.indptr))
+    ends = L_before.indices
+    # A weight of just a bridge's may be one, or may come from triangles: then they say so again.
+    in_doubt = np.flatnonzero(L_before.data == -BRIDGE_WEIGHT)
+    # Of nodes at the floor the mass beneath it is not known.
+    exact = touched | (M_before == M_before.min())
+    exact[starts[in_doubt]] = True
+    weights, masses = star_weights(centers, triangles[exact[triangles].any(axis=1)])
+    stays = (starts != ends) & ~(touched[starts] & touched[ends])
+    found = weights.tocoo()
+    keys = [row.astype(np.int64) * n + column for row, column in ((starts, ends), (found.row, found.col))]
+    is_bridge = ~np.isin(keys[0][in_doubt], keys[1][found.data >= 0.5 * BRIDGE_WEIGHT])
+    stays[in_doubt[is_bridge]] = False
+    is_new = touched[found.row] & touched[found.col]
+    values = np.concatenate([-L_before.data[stays], found.data[is_new]])
+    rows = np.concatenate([starts[stays], found.row[is_new]])
+    columns = np.concatenate([ends[stays], found.col[is_new]])
+    weights = sp.coo_array((values, (rows, columns)), shape=(n, n)).tocsr()
+    weights.sort_indices()
+    weights = weights + _bridges(weights, graph)
+    return _laplacian_of(weights), _floored(np.where(exact, masses, M_before), graph)
+
+
 def star_weights(
     centers: NDArray[np.float64], triangles: NDArray[np.integer]
 ) -> tuple[sp.csr_array, NDArray[np.float64]]:

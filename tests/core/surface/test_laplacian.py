@@ -1,15 +1,17 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial.transform import Rotation
 
-from splap_editor.core.graph.splat_graph import GraphOptions, SplatGraph, splat_graph
+from splap_editor.core.graph.splat_graph import GraphOptions, SplatGraph, mended_graph, splat_graph
 from splap_editor.core.splats.occupancy import occupancy_ellipses
 from splap_editor.core.splats.splats import Splats
-from splap_editor.core.surface.geodesics import geodesic_neighbors
-from splap_editor.core.surface.laplacian import BRIDGE_WEIGHT, MASS_FLOOR, point_cloud_laplacian
-from splap_editor.core.surface.local_triangulation import local_triangulations
+from splap_editor.core.surface.geodesics import geodesic_neighbors, mended_neighborhoods
+from splap_editor.core.surface.laplacian import BRIDGE_WEIGHT, MASS_FLOOR, mended_star_laplacian, point_cloud_laplacian
+from splap_editor.core.surface.local_triangulation import local_triangulations, mended_triangulations
 from tests.core.splat_scenes import ball, cloud, joined, moved, sheet, shuffled, splats_of
 from tests.reference.graph import cotangent_laplacian, is_positive_semidefinite
 
@@ -149,3 +151,36 @@ def test_wrong_arguments_are_rejected(arguments, message):
     good = {"centers": np.random.default_rng(0).normal(size=(4, 3)), "triangles": np.array([[0, 1, 2]])}
     with pytest.raises(ValueError, match=message):
         point_cloud_laplacian(**(good | arguments))
+
+
+MENDED = {
+    "seam of a sheet": (sheet(400), lambda edges, x: edges[(x[edges] < 0.5).sum(axis=1) == 1]),
+    "every seventh edge of a ball": (ball(300), lambda edges, x: edges[::7]),
+    "a cloud's bridges": (cloud(300, size=0.12), lambda edges, x: edges[::11]),
+    "one edge of two sheets": (joined(sheet(196), sheet(196, height=0.3)), lambda edges, x: edges[5:6]),
+    "a chain": (SCENES["line"], lambda edges, x: edges[9:10]),
+}
+"""Splats, and which edges (E, 2) are cut, by the nodes' first coordinate."""
+
+
+@pytest.mark.parametrize("scene", MENDED)
+@pytest.mark.parametrize("way", ["cut", "put back"])
+def test_a_mended_laplacian_is_the_full_sum_to_the_bit(scene, way):
+    splats, chosen = MENDED[scene]
+    ellipses = occupancy_ellipses(splats)
+    options = GraphOptions()
+    graph = splat_graph(ellipses, options)
+    edges = chosen(graph.edges, ellipses.centers[:, 0])
+    mended = mended_graph(ellipses, graph, replace(options, cut=tuple(map(tuple, ellipses.rows[edges].tolist()))))
+    first, second = (graph, mended) if way == "cut" else (mended, graph)
+    near = geodesic_neighbors(first)
+    triangles = local_triangulations(ellipses, near)
+    before = triangles, *point_cloud_laplacian(ellipses.centers, triangles, graph=first)
+    near, nodes = mended_neighborhoods(second, near, np.unique(edges), GraphOptions().k)
+    triangles = mended_triangulations(ellipses, near, triangles, nodes)
+    found = mended_star_laplacian(ellipses.centers, triangles, second, nodes, *before)
+    expected = point_cloud_laplacian(ellipses.centers, triangles, graph=second)
+    for name in ("indptr", "indices", "data"):
+        np.testing.assert_array_equal(getattr(found[0], name), getattr(expected[0], name))
+    np.testing.assert_array_equal(found[1], expected[1])
+    assert found[0].indices.dtype == np.int32 == found[0].indptr.dtype
