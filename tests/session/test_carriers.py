@@ -9,13 +9,7 @@ from splap_editor.engine.quantities import QUANTITIES
 from splap_editor.io.sample_maker import HAZE, shape_sample, write_sample
 from splap_editor.session.bound_edit import snapshot_of
 from splap_editor.session.session import Session
-from tests.session.main_thread import MainThread
 from tests.session.test_session import bent
-
-
-@pytest.fixture
-def main():
-    return MainThread()
 
 
 @pytest.fixture

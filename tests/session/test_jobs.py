@@ -1,38 +1,12 @@
 """Laws of the worker: order, progress, cancel, failure, and a clean end."""
 
-import queue
 import threading
 
 import pytest
 
 from splap_editor.core.progress import Cancelled
 from splap_editor.session.jobs import Job, Worker
-
-
-class MainThread:
-    """Runs what the worker posts, when told to."""
-
-    def __init__(self):
-        self.calls = queue.Queue()
-
-    def post(self, call):
-        self.calls.put(call)
-
-    def run_until(self, condition):
-        while not condition():
-            self.calls.get(timeout=20)()
-
-
-@pytest.fixture
-def main():
-    return MainThread()
-
-
-@pytest.fixture
-def worker(main):
-    worker = Worker(main.post)
-    yield worker
-    worker.close()
+from tests.session.main_thread import MainThread
 
 
 def test_a_value_reaches_the_main_thread(main, worker):

@@ -10,14 +10,8 @@ from splap_editor.resources import resource
 from splap_editor.session.saved_state import Look, restore_scene, saved_state, session_file_of
 from splap_editor.session.scene import Scene
 from splap_editor.session.session import Session
-from tests.session.main_thread import MainThread
 
 TUBE = resource("samples", "tube.ply")
-
-
-@pytest.fixture
-def main():
-    return MainThread()
 
 
 @pytest.fixture

@@ -20,14 +20,8 @@ from splap_editor.session import work
 from splap_editor.session.edit_file import write_edit
 from splap_editor.session.placement import disc_rows, held_pose, rows_region
 from splap_editor.session.session import Session
-from tests.session.main_thread import MainThread
 
 TUBE = resource("samples", "tube.ply")
-
-
-@pytest.fixture
-def main():
-    return MainThread()
 
 
 @pytest.fixture

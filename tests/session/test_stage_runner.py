@@ -6,10 +6,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from splap_editor.session.jobs import Job, Starter, Worker
+from splap_editor.session.jobs import Job, Starter
 from splap_editor.session.stage_runner import StageRunner
 from splap_editor.session.stages import STAGES, Ledger, Stage
-from tests.session.main_thread import MainThread
 
 
 class Edit:
@@ -19,18 +18,6 @@ class Edit:
 
     def __init__(self, number):
         self.number = number
-
-
-@pytest.fixture
-def main():
-    return MainThread()
-
-
-@pytest.fixture
-def worker(main):
-    worker = Worker(main.post)
-    yield worker
-    worker.close()
 
 
 @pytest.fixture
