@@ -91,11 +91,6 @@ class Session:
         return self._ledger.bound
 
     @property
-    def is_posed(self) -> bool:
-        """Whether the kernels on screen are those of the edit on screen: settled, or the newest frame of a drag."""
-        return self.scene is not None and self._ledger.is_posed
-
-    @property
     def has_unexported_edit(self) -> bool:
         """Whether the edit differs from the one last exported (or from the file's own pose)."""
         return self.scene is not None and self._ledger.has_unexported_edit

@@ -100,7 +100,7 @@ def test_the_newest_request_wins(main, opened):
     scene.pose_changed.connect(lambda: shown.append(scene.kernels))
     for step in range(1, 101):
         opened.drag.preview({handle.handle_id: Pose((0.002 * step, 0.0, 0.0))})
-    main.run_until(lambda: opened.is_posed)
+    main.run_until(lambda: not opened.drag.awaits_frame)
     assert len(shown) < 50, "requests that came too late are skipped"
 
 
@@ -151,7 +151,7 @@ def test_the_path_of_the_drag_does_not_matter(main, opened):
     direct = opened.scene.kernels.means.copy()
     for pose in (Pose((-0.4, 0.1, 0.5)), Pose((0.0, -0.5, 0.2)), Pose((0.3, 0.3, 0.0))):
         opened.drag.preview({handle.handle_id: pose})
-        main.run_until(lambda: opened.is_posed)
+        main.run_until(lambda: not opened.drag.awaits_frame)
     opened.drag.commit("Move handle")
     main.run_until(lambda: opened.state == "settled")
     np.testing.assert_array_equal(opened.scene.kernels.means, direct)
