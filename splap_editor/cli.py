@@ -63,19 +63,7 @@ def _parser() -> argparse.ArgumentParser:
     edit.add_argument("file", nargs="?", type=Path, help="a splat file; the bundled sample by default")
     edit.set_defaults(run=_edit)
 
-    deform = commands.add_parser("deform", help="deform splats by a recipe")
-    _add_input(deform)
-    _add_edit(deform, required=True)
-    _add_frames(deform, "write a PLY for each frame of a session's timeline")
-    deform.add_argument(
-        "-o", "--output", required=True, type=Path, metavar="OUT", help="a PLY, or what its ending names"
-    )
-    deform.add_argument("--as-3dgs", action="store_true", help="add a thin third scale to a file of two")
-    deform.add_argument("--columns", default="", metavar="NAMES", help="also write quantities: displacement,stretch")
-    deform.add_argument("--no-cache", action="store_true", help="neither read nor keep graph and Laplacian")
-    _add_output(deform)
-    deform.set_defaults(run=_deform)
-
+    _add_deform(commands.add_parser("deform", help="deform splats by a recipe"))
     for name, text, add in (
         ("clean", "remove floaters, and what lies outside a box", add_clean),
         ("place", "level, turn, scale and move a whole scene", add_place),
@@ -92,21 +80,8 @@ def _parser() -> argparse.ArgumentParser:
     _add_output(convert)
     convert.set_defaults(run=_convert)
 
-    render = commands.add_parser("render", help="draw a picture, the frames of an animation, or a turn all round")
-    _add_input(render)
-    _add_edit(render, required=False)
-    render.add_argument(
-        "-o", "--output", required=True, type=Path, metavar="OUT.png", help="or a folder, .mp4, .webm, .gif or .apng"
-    )
-    _add_frames(render, "draw a picture for each frame of a session's timeline")
-    render.add_argument("--turntable", type=int, metavar="N", help="draw N pictures all round")
-    render.add_argument("--fps", type=float, metavar="N", help="of a video; default the session's, or 24")
-    render.add_argument("--size", type=_size, default=(1280, 720), metavar="WxH", help="in pixels; default 1280x720")
-    render.add_argument("--mode", choices=("splats", "ellipses", "points"), help="how; default splats")
-    render.add_argument("--transparent", action="store_true", help="no background")
-    render.add_argument("--no-cache", action="store_true", help="neither read nor keep graph and Laplacian")
-    _add_output(render)
-    render.set_defaults(run=_render)
+    turn = "draw a picture, the frames of an animation, or a turn all round"
+    _add_render(commands.add_parser("render", help=turn))
 
     info = commands.add_parser("info", help="say what wrote a file, what is in it and what is odd about it")
     _add_input(info)
@@ -122,6 +97,37 @@ def _parser() -> argparse.ArgumentParser:
     graph.set_defaults(run=_graph)
     installation.add_commands(commands)
     return parser
+
+
+def _add_deform(deform: argparse.ArgumentParser) -> None:
+    _add_input(deform)
+    _add_edit(deform, required=True)
+    _add_frames(deform, "write a PLY for each frame of a session's timeline")
+    deform.add_argument(
+        "-o", "--output", required=True, type=Path, metavar="OUT", help="a PLY, or what its ending names"
+    )
+    deform.add_argument("--as-3dgs", action="store_true", help="add a thin third scale to a file of two")
+    deform.add_argument("--columns", default="", metavar="NAMES", help="also write quantities: displacement,stretch")
+    deform.add_argument("--no-cache", action="store_true", help="neither read nor keep graph and Laplacian")
+    _add_output(deform)
+    deform.set_defaults(run=_deform)
+
+
+def _add_render(render: argparse.ArgumentParser) -> None:
+    _add_input(render)
+    _add_edit(render, required=False)
+    render.add_argument(
+        "-o", "--output", required=True, type=Path, metavar="OUT.png", help="or a folder, .mp4, .webm, .gif or .apng"
+    )
+    _add_frames(render, "draw a picture for each frame of a session's timeline")
+    render.add_argument("--turntable", type=int, metavar="N", help="draw N pictures all round")
+    render.add_argument("--fps", type=float, metavar="N", help="of a video; default the session's, or 24")
+    render.add_argument("--size", type=_size, default=(1280, 720), metavar="WxH", help="in pixels; default 1280x720")
+    render.add_argument("--mode", choices=("splats", "ellipses", "points"), help="how; default splats")
+    render.add_argument("--transparent", action="store_true", help="no background")
+    render.add_argument("--no-cache", action="store_true", help="neither read nor keep graph and Laplacian")
+    _add_output(render)
+    render.set_defaults(run=_render)
 
 
 def _add_input(parser: argparse.ArgumentParser) -> None:

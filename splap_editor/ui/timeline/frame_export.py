@@ -86,31 +86,11 @@ def submit_frames(
         return frame_poser(surface, edit, cache=cache, progress=job.progress("binding"), run=side_by_side(n_threads))
 
     def work(job: Job) -> list[Path]:
-        frames, path = order.frames, order.path
         poses = poser(job)
-        progress = job.progress("frames")
         if desk is None:
-            return write_frames(poses, file, frames, path, as_3dgs=order.as_3dgs, progress=progress)
-        if order.kind == "pictures" and is_video(path):
-            drawn = drawn_frames(poses, frames, lambda k: desk.picture(job, k), progress=progress)
-            write_video(path, drawn, edit.timeline.fps)
-            return [path]
-        if order.kind == "pictures":
-            return write_pictures(poses, frames, path, lambda k: desk.picture(job, k), write_png, progress=progress)
-        kernels = poses.kernels(None)
-
-        def turned() -> Iterator[NDArray[np.uint8]]:
-            for number, view in enumerate(turntable_views(desk.view, len(frames), desk.world_up), start=1):
-                yield desk.picture(job, kernels, view)
-                progress(number / len(frames))
-
-        if is_video(path):
-            write_video(path, turned(), edit.timeline.fps)
-            return [path]
-        written = [frame_path(path, number, len(frames)) for number in range(1, len(frames) + 1)]
-        for each, picture in zip(written, turned(), strict=True):
-            write_png(each, picture)
-        return written
+            progress = job.progress("frames")
+            return write_frames(poses, file, order.frames, order.path, as_3dgs=order.as_3dgs, progress=progress)
+        return _draw(desk, order, poses, edit.timeline.fps, job)
 
     def ended(call: Callable[[], None]) -> None:
         if desk is not None:
@@ -128,6 +108,30 @@ def submit_frames(
             stopped=lambda: ended(lambda: None),
         )
     )
+
+
+def _draw(desk: "_Desk", order: FrameOrder, poses: FramePoser, fps: float, job: Job) -> list[Path]:
+    """Draw frames of an animation or a turn all round, into pictures or a video; runs on the worker."""
+    frames, path, progress = order.frames, order.path, job.progress("frames")
+    if order.kind == "pictures" and is_video(path):
+        write_video(path, drawn_frames(poses, frames, lambda k: desk.picture(job, k), progress=progress), fps)
+        return [path]
+    if order.kind == "pictures":
+        return write_pictures(poses, frames, path, lambda k: desk.picture(job, k), write_png, progress=progress)
+    kernels = poses.kernels(None)
+
+    def turned() -> Iterator[NDArray[np.uint8]]:
+        for number, view in enumerate(turntable_views(desk.view, len(frames), desk.world_up), start=1):
+            yield desk.picture(job, kernels, view)
+            progress(number / len(frames))
+
+    if is_video(path):
+        write_video(path, turned(), fps)
+        return [path]
+    written = [frame_path(path, number, len(frames)) for number in range(1, len(frames) + 1)]
+    for each, picture in zip(written, turned(), strict=True):
+        write_png(each, picture)
+    return written
 
 
 class _Desk:
