@@ -8,6 +8,7 @@ from splap_editor.tools.bindings import Binding
 from splap_editor.tools.brush_tool import BrushTool
 from splap_editor.tools.click_tool import ClickTool
 from splap_editor.tools.crop_tool import CropTool
+from splap_editor.tools.floaters_tool import FloatersTool
 from splap_editor.tools.handle_tool import HandleTool
 from splap_editor.tools.inspect_tool import InspectTool
 from splap_editor.tools.join_tool import JoinTool
@@ -67,7 +68,8 @@ TOOLS: tuple[ToolEntry, ...] = (
     ToolEntry(ClickTool, "&Click", "Shift+Q", "Select splats one by one; a drag looks around.", "Select"),
     ToolEntry(HandleTool, "&Handle", "W", "Click the surface to place a handle.", "Place handles and pins"),
     ToolEntry(PinTool, "&Pin", "E", "Click the surface to hold it in place.", "Place handles and pins"),
-    ToolEntry(CropTool, "Cro&p", "Shift+B", "Remove what is outside or inside of a box, sphere or plane.", "Crop"),
+    ToolEntry(CropTool, "Cro&p", "Shift+B", "Remove what is outside or inside of a box, sphere or plane.", "Clean up"),
+    ToolEntry(FloatersTool, "&Floaters", "Shift+F", "Find haze, clumps and specks, and remove them.", "Clean up"),
     ToolEntry(SeparateTool, "&Separate", "", "Draw over two parts to take them apart.", "Mend the surface"),
     ToolEntry(JoinTool, "&Join", "", "Draw across a gap to tie its two rims together.", "Mend the surface"),
     ToolEntry(InspectTool, "&Inspect", "I", "See a splat's card and neighbours, or an edge's.", "Inspect"),

@@ -101,7 +101,9 @@ class HeldForm(QWidget):
             return choice
         field = NumberField(hint.low, hint.high, decimals=hint.decimals, step=hint.step, unit=hint.unit)
         field.setToolTip(hint.tip)
-        field.setFixedWidth(64)
+        # Six of them fit beside the buttons of a small window.
+        field.setMinimumWidth(40)
+        field.setMaximumWidth(64)
         grip = ScrubLabel(hint.label, field)
         for told in (field.committed, grip.moved):
             told.connect(lambda number: self._take(name, number / hint.factor))

@@ -1,0 +1,34 @@
+"""The bar over the viewport: a tool's choices and numbers are its options, both ways."""
+
+from PySide6.QtCore import Qt
+
+from splap_editor.tools.crop_tool import CropNumbers, CropOptions
+from splap_editor.ui.widgets.tool_options import ToolOptionsBar
+
+
+def test_a_choice_sets_the_crop_shape_and_shows_another_one(driver):
+    (bar,) = driver.window.findChildren(ToolOptionsBar)
+    held = driver.window.tools.context.held(CropOptions)
+    choice = bar.forms[CropOptions].editors["kind"]
+    choice.activated.emit(choice.findData("ball"))
+    assert held.value.kind == "ball"
+    held.set(CropOptions("plane"))
+    assert choice.currentData() == "plane"
+
+
+def test_a_crop_from_the_keyboard_is_undone(driver):
+    window = driver.window
+    window.tools.choose("crop")
+    tool = window.tools.chosen
+    tool.begin()
+    (bar,) = window.findChildren(ToolOptionsBar)
+    width = bar.forms[CropNumbers].editors["width"]
+    width.committed.emit(0.5 * width.value())
+    goes = tool.goes()
+    assert goes.any() and not goes.all()
+    driver.key(Qt.Key.Key_Return)
+    assert (driver.scene.removed == goes).all()
+    driver.wait_idle()
+    driver.session.history.undo()
+    assert driver.scene.edit.removed is None
+    driver.wait_idle()
