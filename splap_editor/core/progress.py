@@ -1,6 +1,7 @@
 """How a long function tells how far it is, and how it is cancelled."""
 
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from typing import Protocol, TypeVar
 
 Result = TypeVar("Result")
@@ -29,6 +30,15 @@ StageProgress = Callable[[str], Progress]
 def silent(stage: str) -> Progress:
     """Report no stage."""
     return no_progress
+
+
+Guard = Callable[[Progress], AbstractContextManager]
+"""Entered around loops that run on several cores: who has several threads lets one at a time in."""
+
+
+def unguarded(progress: Progress) -> AbstractContextManager:
+    """For who has one thread."""
+    return nullcontext()
 
 
 class Runner(Protocol):

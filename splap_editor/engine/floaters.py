@@ -5,7 +5,7 @@ import numpy as np
 from splap_editor.core.graph.options import GraphOptions
 from splap_editor.core.graph.splat_graph import SplatGraph, splat_graph
 from splap_editor.core.index_spaces import FileMask
-from splap_editor.core.progress import StageProgress, silent
+from splap_editor.core.progress import Guard, StageProgress, silent, unguarded
 from splap_editor.core.splats.contributions import contributions
 from splap_editor.core.splats.floaters import Floaters, floaters
 from splap_editor.core.splats.occupancy import Ellipses, occupancy_ellipses
@@ -13,7 +13,12 @@ from splap_editor.core.splats.splats import Splats
 
 
 def scene_floaters(
-    splats: Splats, ellipses: Ellipses, graph: SplatGraph | None = None, *, stages: StageProgress = silent
+    splats: Splats,
+    ellipses: Ellipses,
+    graph: SplatGraph | None = None,
+    *,
+    stages: StageProgress = silent,
+    alone: Guard = unguarded,
 ) -> Floaters:
     """Weigh the evidence that the nodes of a scene float; any strength can be asked of the result.
 
@@ -23,22 +28,33 @@ def scene_floaters(
     ellipses : Ellipses
         Of those that are left.
     graph : SplatGraph, optional
-        Theirs, made with any options; made here without.
+        Theirs, as `GraphOptions` has it by default; made here without.
     stages : callable
         ``stages(name)`` gives the progress callback of a stage.
+    alone : callable
+        ``alone(progress)`` is entered around the graph search.
     """
     if graph is None:
-        graph = splat_graph(ellipses, GraphOptions(), progress=stages("graph"))
+        with alone(stages("graph")):
+            graph = splat_graph(ellipses, GraphOptions(), progress=stages("graph"))
     shown = contributions(splats, ellipses, progress=stages("contributions"))
     return floaters(splats, ellipses, graph.matrix(), shown)
 
 
-def floating_rows(splats: Splats, removed: FileMask | None, strength: float) -> FileMask:
+def floating_rows(
+    splats: Splats,
+    removed: FileMask | None,
+    strength: float,
+    *,
+    stages: StageProgress = silent,
+    alone: Guard = unguarded,
+) -> FileMask:
     """(N,) what floats at a strength among the splats that are left, inert ones never."""
     mask = np.zeros(splats.n_splats, bool)
     if strength <= 0.0:
         return mask
     ellipses = occupancy_ellipses(splats, removed=removed)
     if ellipses.n_nodes:
-        mask[ellipses.rows[scene_floaters(splats, ellipses).at(strength)]] = True
+        found = scene_floaters(splats, ellipses, stages=stages, alone=alone)
+        mask[ellipses.rows[found.at(strength)]] = True
     return mask

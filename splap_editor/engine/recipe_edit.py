@@ -4,6 +4,7 @@ import numpy as np
 
 from splap_editor.core.graph.options import GraphOptions
 from splap_editor.core.handle_nodes import Region
+from splap_editor.core.removal import Finder as Find
 from splap_editor.core.removal import PickedRows
 from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.edit import HANDLE_COLORS, Edit, Handle, Pin
@@ -31,10 +32,10 @@ def recipe_of(edit: Edit, *, with_disabled: bool = False) -> plain.Edit:
     )
 
 
-def edit_of(recipe: plain.Edit, splats: Splats) -> Edit:
+def edit_of(recipe: plain.Edit, splats: Splats, find: Find | None = None) -> Edit:
     """Make an edit of a recipe.
 
-    The centre of a handle given by rows alone is the mean of its splats.
+    The centre of a handle given by rows alone is the mean of its splats. ``find`` is as in `removal_of`.
 
     Raises
     ------
@@ -61,7 +62,7 @@ def edit_of(recipe: plain.Edit, splats: Splats) -> Edit:
         ),
         method=recipe.method,
         options=recipe.options,
-        removal=_removal(recipe, splats),
+        removal=_removal(recipe, splats, find),
         place=recipe.place,
     )
 
@@ -97,9 +98,9 @@ def rows_of(file: SplatFile) -> str:
     return content_hash(file.path) if FORMATS[file.format_name].reorders else ""
 
 
-def _removal(recipe: plain.Edit, splats: Splats) -> Removal:
+def _removal(recipe: plain.Edit, splats: Splats, find: Find | None) -> Removal:
     try:
-        return removal_of(recipe.remove, splats)
+        return removal_of(recipe.remove, splats, find)
     except ValueError as error:
         raise RecipeError(str(error)) from error
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from splap_editor.core.index_spaces import FileMask
+from splap_editor.core.progress import Guard, StageProgress, silent, unguarded
+from splap_editor.core.removal import Finder as Find
 from splap_editor.core.removal import (
     Picked,
     PickedFloaters,
@@ -76,8 +78,16 @@ class Removal:
         return np.array_equal(self.mask, other.mask)
 
 
-def removal_of(steps: Iterable[RemovalStep], splats: Splats) -> Removal:
+def removal_of(steps: Iterable[RemovalStep], splats: Splats, find: Find | None = None) -> Removal:
     """Find what the steps of a recipe remove from a file's splats.
+
+    Parameters
+    ----------
+    steps : iterable of RemovalStep
+    splats : Splats
+        All of the file's.
+    find : callable, optional
+        A `Finder`, for who wants to be told how far it is.
 
     Raises
     ------
@@ -85,7 +95,7 @@ def removal_of(steps: Iterable[RemovalStep], splats: Splats) -> Removal:
         A row is not in the file, or a quantity does not exist.
     """
     steps = tuple(steps)
-    mask = removed_splats(steps, splats.means, Finder(splats)) if steps else None
+    mask = removed_splats(steps, splats.means, find or Finder(splats)) if steps else None
     # Steps that remove nothing here may do so in another capture.
     return Removal(steps, mask if mask is not None and mask.any() else None)
 
@@ -97,24 +107,37 @@ class Finder:
     ----------
     splats : Splats
         All of the file's.
+    stages : callable
+        ``stages(name)`` gives the progress callback of a stage.
+    alone : callable
+        ``alone(progress)`` is entered around a graph search.
     """
 
-    def __init__(self, splats: Splats) -> None:
+    def __init__(self, splats: Splats, *, stages: StageProgress = silent, alone: Guard = unguarded) -> None:
         self._splats = splats
+        self._stages = stages
+        self._alone = alone
 
     def __call__(self, picked: Picked, removed: FileMask) -> FileMask:
         """(N,) which of the splats that are left are picked."""
         if isinstance(picked, PickedFloaters):
             from splap_editor.engine.floaters import floating_rows
 
-            return floating_rows(self._splats, removed, picked.strength)
+            return floating_rows(self._splats, removed, picked.strength, stages=self._stages, alone=self._alone)
         assert isinstance(picked, PickedRange)
-        values = rest_values(picked.quantity, self._splats, removed)
+        values = rest_values(picked.quantity, self._splats, removed, stages=self._stages, alone=self._alone)
         with np.errstate(invalid="ignore"):
             return (values >= picked.least) & (values <= picked.most)
 
 
-def rest_values(name: str, splats: Splats, removed: FileMask | None = None) -> np.ndarray:
+def rest_values(
+    name: str,
+    splats: Splats,
+    removed: FileMask | None = None,
+    *,
+    stages: StageProgress = silent,
+    alone: Guard = unguarded,
+) -> np.ndarray:
     """(N,) a quantity of a scene at rest, NaN for what is removed.
 
     Raises
@@ -134,5 +157,6 @@ def rest_values(name: str, splats: Splats, removed: FileMask | None = None) -> n
         from splap_editor.core.graph.options import GraphOptions
         from splap_editor.core.graph.splat_graph import splat_graph
 
-        graph = splat_graph(ellipses, GraphOptions())
+        with alone(stages("graph")):
+            graph = splat_graph(ellipses, GraphOptions(), progress=stages("graph"))
     return values_of(QUANTITIES[name], Snapshot(splats, ellipses, bare_graph=graph))

@@ -15,19 +15,17 @@ from splap_editor.core.graph.options import GRAPH_RULES, LAPLACIANS, NEIGHBORHOO
 from splap_editor.core.graph.splat_graph import SplatGraph, require_mendable
 from splap_editor.core.index_spaces import FileMask, RowPair
 from splap_editor.core.kept_arrays import Arrays
-from splap_editor.core.progress import StageProgress, silent
+from splap_editor.core.progress import Guard, StageProgress, silent, unguarded
 from splap_editor.core.splats.occupancy import Ellipses, occupancy_ellipses
 from splap_editor.core.splats.splats import Splats
 from splap_editor.core.surface.geodesics import Neighborhoods
 from splap_editor.engine.cache import StageCache, content_key
 from splap_editor.engine.sources import source_hash
 from splap_editor.engine.surface_stages import (
-    Guard,
     SurfaceStages,
     mended_stages,
     packed_stages,
     plain_stages,
-    unguarded,
     unmended,
     unpacked_stages,
 )

@@ -1,7 +1,7 @@
 """The slow stages of a scene: made in full, loaded, or brought up to date after a mend."""
 
-from collections.abc import Callable, Iterable
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Iterable
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import NamedTuple, Protocol
 
@@ -14,7 +14,7 @@ from splap_editor.core.graph.splat_graph import SplatGraph, mended_graph, splat_
 from splap_editor.core.index_spaces import Nodes, RowPair
 from splap_editor.core.kept_arrays import Arrays, require_array, require_rows
 from splap_editor.core.options import loaded
-from splap_editor.core.progress import Progress, StageProgress
+from splap_editor.core.progress import Guard, StageProgress, unguarded
 from splap_editor.core.splats.occupancy import Ellipses
 from splap_editor.core.surface.geodesics import Neighborhoods
 from splap_editor.core.surface.laplacian import point_cloud_laplacian
@@ -61,15 +61,6 @@ class SurfaceStages(NamedTuple):
 def unmended(options: GraphOptions) -> GraphOptions:
     """Leave out the cut and added edges, and strokes."""
     return replace(options, cut=(), add=(), separate=(), join=())
-
-
-Guard = Callable[[Progress], AbstractContextManager]
-"""Entered around loops that run on several cores: who has several threads lets one at a time in."""
-
-
-def unguarded(progress: Progress) -> AbstractContextManager:
-    """For who has one thread."""
-    return nullcontext()
 
 
 def plain_stages(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from splap_editor.core.progress import Progress, no_progress
+from splap_editor.engine.removal import Finder
 from splap_editor.io.session_file import content_hash, read_session_file, write_session_file
 from splap_editor.io.session_specs import SessionFile
 from splap_editor.session.jobs import Job, Post, Starter, Worker
@@ -170,8 +171,8 @@ class Documents:
         def done(found: tuple[_Arrival, Path]) -> None:
             arrival, source = found
 
-            def restore(scene: Scene) -> None:
-                restore_scene(scene, arrival.session)
+            def restore(scene: Scene, find: Finder) -> None:
+                restore_scene(scene, arrival.session, find)
                 arrival.scene = scene
 
             self._arrival = arrival

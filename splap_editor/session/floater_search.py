@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from splap_editor.core.graph.options import GraphOptions
 from splap_editor.core.graph.splat_graph import SplatGraph, splat_graph
 from splap_editor.core.index_spaces import FileMask, FileRow, FileRows
+from splap_editor.core.progress import Guard, StageProgress, silent, unguarded
 from splap_editor.core.removal import PickedFloaters, RemovalStep
 from splap_editor.core.splats.floaters import Floaters
 from splap_editor.core.splats.occupancy import Ellipses, occupancy_ellipses
@@ -93,7 +94,14 @@ class FoundFloaters:
         return int(self.labels[at[0]]) if len(at) else None
 
 
-def floater_search(splats: Splats, removal: Removal, surface: Surface | None) -> FloaterSearch:
+def floater_search(
+    splats: Splats,
+    removal: Removal,
+    surface: Surface | None,
+    *,
+    stages: StageProgress = silent,
+    alone: Guard = unguarded,
+) -> FloaterSearch:
     """Look at the splats that are left, as `splap_editor.engine.floaters.floating_rows` does for a recipe.
 
     Parameters
@@ -104,6 +112,10 @@ def floater_search(splats: Splats, removal: Removal, surface: Surface | None) ->
         What is left out already.
     surface : Surface, optional
         Its graph is taken where it is the one that a recipe would make.
+    stages : callable
+        ``stages(name)`` gives the progress callback of a stage.
+    alone : callable
+        ``alone(progress)`` is entered around a graph search.
     """
     graph: SplatGraph | None = None
     if surface is not None and surface.options == GraphOptions() and _leaves_out(surface, removal):
@@ -111,8 +123,9 @@ def floater_search(splats: Splats, removal: Removal, surface: Surface | None) ->
     else:
         ellipses = occupancy_ellipses(splats, removed=removal.mask)
     if graph is None:
-        graph = splat_graph(ellipses, GraphOptions())
-    return FloaterSearch(ellipses, graph.matrix(), scene_floaters(splats, ellipses, graph), removal)
+        with alone(stages("graph")):
+            graph = splat_graph(ellipses, GraphOptions(), progress=stages("graph"))
+    return FloaterSearch(ellipses, graph.matrix(), scene_floaters(splats, ellipses, graph, stages=stages), removal)
 
 
 def _leaves_out(surface: Surface, removal: Removal) -> bool:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from splap_editor.core.index_spaces import FileMask
+from splap_editor.core.removal import Finder as Find
 from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.edit import Edit
 from splap_editor.engine.recipe_edit import edit_of, recipe_of
@@ -95,7 +96,7 @@ def session_file_of(state: SavedState, folder: Path | None, content_hash: str) -
     )
 
 
-def session_edit(session: SessionFile, splats: Splats) -> Edit:
+def session_edit(session: SessionFile, splats: Splats, find: Find | None = None) -> Edit:
     """Make the edit of a session file.
 
     Parameters
@@ -103,13 +104,15 @@ def session_edit(session: SessionFile, splats: Splats) -> Edit:
     session : SessionFile
     splats : Splats
         Of the PLY it belongs to.
+    find : callable, optional
+        As in `splap_editor.engine.removal.removal_of`.
 
     Raises
     ------
     RecipeError
         A row is not in the PLY.
     """
-    edit = edit_of(session.recipe, splats)
+    edit = edit_of(session.recipe, splats, find)
     handles = tuple(
         replace(handle, handle_id=settings.handle_id, color=settings.color, enabled=settings.enabled)
         for handle, settings in zip(edit.handles, session.handles, strict=True)
@@ -123,8 +126,10 @@ def session_edit(session: SessionFile, splats: Splats) -> Edit:
     return replace(edit, handles=handles, pins=pins, timeline=session.timeline)
 
 
-def restore_scene(scene: Scene, session: SessionFile) -> None:
+def restore_scene(scene: Scene, session: SessionFile, find: Find | None = None) -> None:
     """Put what a session file holds into a scene just read, before anyone follows it.
+
+    ``find`` is as in `splap_editor.engine.removal.removal_of`.
 
     Raises
     ------
@@ -132,7 +137,7 @@ def restore_scene(scene: Scene, session: SessionFile) -> None:
         The session belongs to another PLY: it names rows that this one does not have.
     """
     try:
-        scene.edit = session_edit(session, scene.splats)
+        scene.edit = session_edit(session, scene.splats, find)
     except ValueError as error:
         raise SessionFileError(f"the session does not fit {scene.file.path.name}: {error}") from None
     known = {handle.handle_id for handle in scene.edit.handles}

@@ -6,10 +6,14 @@ from typing import Any
 
 from splap_editor.engine.bound_edit import BoundEdit
 from splap_editor.engine.cache import StageCache
+from splap_editor.engine.edit import Edit
+from splap_editor.engine.removal import Finder
 from splap_editor.session.depictor import Depictor, Unseen
 from splap_editor.session.drag import Drag
+from splap_editor.session.edit_file import read_edit
 from splap_editor.session.history import History
 from splap_editor.session.jobs import Post, Starter, Worker
+from splap_editor.session.latest_job import LatestJob
 from splap_editor.session.scene import Scene
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.signals import Signal
@@ -17,7 +21,7 @@ from splap_editor.session.stage_runner import StageRunner
 from splap_editor.session.stages import Ledger
 from splap_editor.session.told_job import ToldJob
 from splap_editor.session.undo_steps import UndoSteps
-from splap_editor.session.work import ExportOrder, OpenRequest
+from splap_editor.session.work import ExportOrder, OpenRequest, told_finder
 
 
 class Session:
@@ -56,12 +60,14 @@ class Session:
         self.history = History()
         self.steps = UndoSteps(self._ledger, self.history)
         self.drag = Drag(self._ledger, self.steps, self._runner.loop("drag"))
+        self._edits = LatestJob(self._openings, "edit", abandons=True)
         self.opening = Signal()
+        self.edit_opened = Signal()
         self.scene_changed = Signal()
         self.exported = Signal()
         self.failed = self._runner.failed
         self.state_changed = self._runner.state_changed
-        SceneFollower(self, edit_changed=self._runner.advance, preview_changed=self._runner.advance)
+        SceneFollower(self, self._edits.drop, edit_changed=self._runner.advance, preview_changed=self._runner.advance)
 
     def close(self) -> None:
         """Cancel everything and join the workers."""
@@ -111,7 +117,9 @@ class Session:
 
     # ------------------------------------------------------------------ files
 
-    def open(self, path: Path, *, layout: str | None = None, restore: Callable[[Scene], None] | None = None) -> None:
+    def open(
+        self, path: Path, *, layout: str | None = None, restore: Callable[[Scene, Finder], None] | None = None
+    ) -> None:
         """Read a splat PLY in the background, at once; the scene on screen stays until it is read.
 
         A file that is still being read is given up, however long its reader takes to hear of it. `opening` tells.
@@ -122,11 +130,32 @@ class Session:
         layout : str, optional
             Read it as this layout instead of the recognised one.
         restore : callable, optional
-            Given the new scene, on the worker, before anyone else knows it: to put a saved edit in place.
+            Given the new scene, on the worker, before anyone else knows it, and what finds the splats that an edit
+            removes: to put a saved edit in place.
         """
         self._ledger.opening = OpenRequest(path, layout, restore, self._ledger.depictor)
         self.opening.emit()
         self._runner.advance()
+
+    def open_edit(self, path: Path) -> None:
+        """Read a recipe in the background and make it the edit of the scene on screen; `edit_opened` tells.
+
+        What it removes as floaters or by a quantity is looked for there too. The newest is taken, if the scene is
+        still there.
+        """
+        scene = self.shown_scene
+
+        def taken(edit: Edit) -> None:
+            self.steps.change_edit(edit, "Open edit")
+            self.edit_opened.emit(path)
+
+        title = f"Opening {path.name}"
+        self._edits.ask(
+            lambda job: read_edit(path, scene, told_finder(job, scene.splats)),
+            taken,
+            failed=lambda error: self.failed.emit(title, error),
+            title=title,
+        )
 
     def stop_opening(self) -> None:
         """Give up the file that is being read, as another is on its way."""

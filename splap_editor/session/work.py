@@ -12,12 +12,13 @@ from splap_editor.core.deformer import Deformation
 from splap_editor.core.graph.splat_graph import GraphOptions
 from splap_editor.core.progress import Progress
 from splap_editor.core.splats.occupancy import Ellipses, occupancy_ellipses
+from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.bound_edit import BoundEdit, Posed, bind, ready_for_drags
 from splap_editor.engine.cache import StageCache
 from splap_editor.engine.edit import Edit
 from splap_editor.engine.export_report import ExportReport
 from splap_editor.engine.quantities import Snapshot
-from splap_editor.engine.removal import Removal
+from splap_editor.engine.removal import Finder, Removal
 from splap_editor.engine.scripting import write_posed
 from splap_editor.engine.surface import Surface, surface_of
 from splap_editor.io.splat_files import SplatFile, read_splats
@@ -37,13 +38,13 @@ class OpenRequest:
     layout : str, optional
         Read it as this layout instead of the recognised one.
     restore : callable, optional
-        Puts a saved edit in place, on the worker.
+        Puts a saved edit in place, on the worker, and is given what finds the splats that it removes.
     depictor : Depictor
     """
 
     path: Path
     layout: str | None
-    restore: Callable[[Scene], None] | None
+    restore: Callable[[Scene, Finder], None] | None
     depictor: Depictor
 
 
@@ -61,10 +62,15 @@ def opened_scene(job: Job, request: OpenRequest) -> OpenedScene:
     scene = Scene(file, occupancy_ellipses(file.splats, progress=job.progress("occupancy")))
     hand_over = request.depictor.depict(file.splats)
     if request.restore is not None:
-        request.restore(scene)
+        request.restore(scene, told_finder(job, file.splats))
         if scene.edit.removed is not None:
             scene.ellipses = scene.visible = occupancy_ellipses(file.splats, removed=scene.edit.removed)
     return OpenedScene(scene, hand_over)
+
+
+def told_finder(job: Job, splats: Splats) -> Finder:
+    """Find the splats of a removal in a job: it says how far it is, and may be cancelled."""
+    return Finder(splats, stages=job.progress, alone=alone)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,10 +6,12 @@ from typing import ClassVar
 import numpy as np
 
 from splap_editor.core.options import option
+from splap_editor.core.progress import Progress
 from splap_editor.session.floater_search import FloaterSearch, FoundFloaters, floater_search
 from splap_editor.session.jobs import Job
 from splap_editor.session.latest_job import LatestJob
 from splap_editor.session.scene_follower import SceneFollower
+from splap_editor.session.side_by_side import alone
 from splap_editor.tools.bindings import Binding
 from splap_editor.tools.crop_tool import GOES_TINT
 from splap_editor.tools.tool import KeyEvent, PointerEvent, Tool, ToolContext
@@ -51,7 +53,7 @@ class FloatersTool(Tool):
         self._is_asked = False
         self._strength = context.held(FloaterOptions)
         self._strength.changed.connect(self._show)
-        self._job = LatestJob(context.session.detail_worker, self.name, failed=self._on_failed)
+        self._job = LatestJob(context.session.detail_worker, self.name, cancels=True, failed=self._on_failed)
         SceneFollower(context.session, self.drop, removed_changed=self.drop)
 
     def ask(self) -> None:
@@ -63,7 +65,14 @@ class FloatersTool(Tool):
         self.context.hud.show(text="Looking for floaters …")
 
         def make(job: Job) -> FloaterSearch:
-            return floater_search(splats, removal, surface)
+            def stages(stage: str) -> Progress:
+                def progress(share: float) -> None:
+                    job.report(share, stage)
+                    job.deliver(lambda: self._tell(stage, share))
+
+                return progress
+
+            return floater_search(splats, removal, surface, stages=stages, alone=alone)
 
         def take(search: FloaterSearch) -> None:
             if session.scene is scene and scene.edit.removal is removal and self._is_asked:
@@ -126,6 +135,11 @@ class FloatersTool(Tool):
         assert self.found is not None
         self.context.fly_to(self.context.viewport.frame(self.found.rows_of(label)))
 
+    def _tell(self, stage: str, share: float) -> None:
+        if self._is_asked:
+            words = "connecting splats" if stage == "graph" else "seeing which splats make the picture"
+            self.context.hud.show(text=f"Looking for floaters – {words}, {share:.0%}")
+
     def _on_failed(self, error: Exception) -> None:
         self.context.hud.show(text=str(error))
 
@@ -137,7 +151,8 @@ class FloatersTool(Tool):
         tints[self.found.rows] = GOES_TINT
         self.context.paint(tints)
         n, k = len(self.found.rows), len(self.found.groups)
-        groups = f"in {k:,} group{'' if k == 1 else 's'} · Return removes, [ ] look at each"
+        share = n / max(int(np.count_nonzero(~self.context.session.shown_scene.removed)), 1)
+        groups = f"({share:.1%}) in {k:,} group{'' if k == 1 else 's'} · Return removes, [ ] look at each"
         self.context.hud.show(text=f"{n:,} splats float {groups}" if n else "Nothing floats at this strength")
         self.context.viewport.request_render()
 

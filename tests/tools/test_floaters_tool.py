@@ -1,7 +1,10 @@
 """Floaters: found in the background, tinted by strength, framed by group, removed in a step that keeps the strength."""
 
+import threading
+
 import numpy as np
 
+from splap_editor.core.progress import Cancelled
 from splap_editor.core.removal import PickedFloaters, RemovalStep
 from splap_editor.engine.floaters import floating_rows
 from splap_editor.engine.removal import Removal
@@ -75,3 +78,33 @@ def test_another_tool_takes_the_tint_away(hand):
     looked_for(hand, some_strength(hand))
     hand.tools.choose("handle")
     assert painted[-1] is None and not hand.context.hud.text
+
+
+def test_it_says_how_far_it_is(hand):
+    told = []
+    hand.context.hud.changed.connect(lambda: told.append(hand.context.hud.text))
+    looked_for(hand, 0.5)
+    assert any("seeing which splats make the picture, 100%" in text for text in told)
+
+
+def test_another_tool_stops_the_looking(hand, monkeypatch):
+    begun, go_on, ended = threading.Event(), threading.Event(), []
+
+    def slow(splats, removal, surface, *, stages, alone):
+        begun.set()
+        go_on.wait(60.0)
+        try:
+            stages("graph")(0.5)
+        except Cancelled:
+            ended.append("cancelled")
+            raise
+
+    monkeypatch.setattr("splap_editor.tools.floaters_tool.floater_search", slow)
+    hand.tools.choose("floaters")
+    tool = hand.tools.chosen
+    hand.hover((5, 5))
+    assert begun.wait(60.0)
+    hand.tools.choose("handle")
+    go_on.set()
+    hand.main.run_until(lambda: not tool._job.is_busy)
+    assert ended == ["cancelled"] and tool.search is None

@@ -136,7 +136,8 @@ def test_saved_edits_open_again(driver, qtbot, tmp_path):
     path = tmp_path / "edit.json"
     driver.window.files._write_edit(path)
     driver.window.actions_["handle.reset_all"].trigger()
-    driver.window.files._read_edit(path)
+    driver.window.files.open_path(path)
+    qtbot.waitUntil(lambda: driver.window.toast.text == "Opened the edit edit.json.", timeout=WAIT_MS)
     assert [handle.pose for handle in driver.scene.edit.handles] == [handle.pose for handle in edit.handles]
     driver.wait_idle()
 

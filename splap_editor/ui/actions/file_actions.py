@@ -15,7 +15,7 @@ from splap_editor.io.splat_files import name_filter
 from splap_editor.resources import resource
 from splap_editor.session.bound_edit import column_lacks
 from splap_editor.session.documents import Documents
-from splap_editor.session.edit_file import read_edit, write_edit
+from splap_editor.session.edit_file import write_edit
 from splap_editor.session.session import Session
 from splap_editor.ui.dialogs.export_dialog import ExportDialog
 from splap_editor.ui.dialogs.picture_dialog import PictureDialog
@@ -62,6 +62,7 @@ class FileActions:
         self._toast = toast
         self._after_export: Callable[[], None] | None = None
         session.exported.connect(self._on_exported)
+        session.edit_opened.connect(lambda path: toast.say(f"Opened the edit {path.name}."))
         session.failed.connect(self._on_failed)
 
     # ---------------------------------------------------------------- open
@@ -93,12 +94,10 @@ class FileActions:
         self._ask_to_read("Open an edit", EDIT_FILTER, self._read_edit)
 
     def _read_edit(self, path: Path) -> None:
-        try:
-            self._session.steps.change_edit(read_edit(path, self._session.shown_scene), "Open edit")
-        except (OSError, ValueError, RuntimeError) as error:
-            self._toast.fail(f"{path.name} was not opened: {sentence(error)}")
+        if self._session.scene is None:
+            self._toast.fail(f"{path.name} was not opened: open the splats that it is for first.")
         else:
-            self._toast.say(f"Opened the edit {path.name}.")
+            self._session.open_edit(path)
 
     # ---------------------------------------------------------------- write
 

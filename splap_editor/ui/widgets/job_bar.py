@@ -15,6 +15,7 @@ STAGES = {
     "reading": "reading the file",
     "occupancy": "measuring splats",
     "graph": "connecting splats",
+    "contributions": "seeing which splats make the picture",
     "geodesics": "measuring along the surface",
     "laplacian": "weighing neighbours",
     "kernels": "attaching splats",
