@@ -8,6 +8,7 @@
 import os
 import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("QT_API", "pyside6")
@@ -20,10 +21,14 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from splap_editor.app import make_window
+from splap_editor.core.removal import PickedFloaters, RemovalStep
+from splap_editor.io.ply import read_ply
+from splap_editor.io.sample_maker import write_sample
 from splap_editor.resources import resource
 from splap_editor.session.edit_file import read_edit
 from splap_editor.ui.theme import apply_theme
 from splap_editor.ui.viewport_widget import ask_of_qt
+from tests.benchmark.floaters import with_floaters
 
 PICTURES = REPOSITORY / "resources" / "pictures"
 SIZE = (1280, 800)
@@ -136,6 +141,31 @@ def weights_picture(person: Person) -> None:
     window.display.set(weights=False)
 
 
+def clean_up_pictures(person: Person) -> None:
+    """Show a bench with made haze, clumps and specks about it, and what the floater finder leaves of that."""
+    window, session = person.window, person.session
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "raw.ply"
+        write_sample(path, with_floaters(read_ply(resource("samples", "bench_2dgs.ply")).splats, seed=2)[0])
+        session.open(path)
+        run_until(lambda: session.scene is not None and session.scene.file.path == path)
+        person.settle()
+        scene, camera = session.shown_scene, window.view.viewport.camera
+        camera.view = camera.look_from((-0.6, -1.0, 0.3))
+        camera.view = seen = window.view.viewport.frame()
+        window.view.viewport.camera_moved()
+        window.overlay.show_hint()
+        window.display.set(mode="splats")
+        person.settle()
+        person.picture("raw", only_view=True)
+        step = RemovalStep(PickedFloaters())
+        session.steps.change_removal(scene.edit.removal.with_step(step, scene.splats), "Remove floaters")
+        person.settle()
+        camera.view = seen
+        window.view.viewport.camera_moved()
+        person.picture("cleaned", only_view=True)
+
+
 def main() -> None:
     """Make every picture."""
     ask_of_qt()
@@ -170,6 +200,7 @@ def main() -> None:
     person.picture("window")
     graph_pictures(person)
     weights_picture(person)
+    clean_up_pictures(person)
     sys.stdout.flush()
     os._exit(0)  # Qt and VTK tear down in no promised order; the pictures are written
 
