@@ -5,13 +5,13 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from splap_editor.core.place import Place, about, levelled, recentred, sized
-from splap_editor.core.removal import PickedBox, PickedFloaters, RemovalStep
 from splap_editor.stage_report import StageReport
 
 if TYPE_CHECKING:
+    import numpy as np
+
+    from splap_editor.core.place import Place
+    from splap_editor.core.removal import PickedBox
     from splap_editor.engine.edit import Edit
     from splap_editor.engine.export_report import ExportReport
     from splap_editor.engine.removal import Removal
@@ -26,7 +26,6 @@ def add_clean(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--strength",
         type=float,
-        default=PickedFloaters.strength,
         metavar="S",
         help="from 0, nothing, to 0.99",
     )
@@ -51,14 +50,16 @@ def add_place(parser: argparse.ArgumentParser) -> None:
 
 def clean(options: argparse.Namespace) -> int:
     """Crop, and remove floaters."""
+    from splap_editor.core.removal import PickedFloaters, RemovalStep
     from splap_editor.core.splats.occupancy import occupancy_ellipses
     from splap_editor.engine.edit import Edit
     from splap_editor.engine.removal import removal_of
 
-    if not 0.0 <= options.strength <= 0.99:
-        raise ValueError(f"--strength must be from 0 to 0.99, got {options.strength:g}")
+    strength = PickedFloaters.strength if options.strength is None else options.strength
+    if not 0.0 <= strength <= 0.99:
+        raise ValueError(f"--strength must be from 0 to 0.99, got {strength:g}")
     report = StageReport(quiet=options.quiet or options.json)
-    steps = [RemovalStep(PickedFloaters(options.strength))]
+    steps = [RemovalStep(PickedFloaters(strength))]
     if options.crop is not None:
         steps.insert(0, RemovalStep(_crop_box(options.crop), outside=True))
     file = _read(options, report)
@@ -89,7 +90,10 @@ def place(options: argparse.Namespace) -> int:
     return _tell(options, report, summary, {"matrix": made.matrix.tolist()})
 
 
-def _place(options: argparse.Namespace, file: "SplatFile") -> Place:
+def _place(options: argparse.Namespace, file: "SplatFile") -> "Place":
+    import numpy as np
+
+    from splap_editor.core.place import Place, about, levelled, recentred, sized
     from splap_editor.core.splats.occupancy import occupancy_ellipses
 
     center = occupancy_ellipses(file.splats).subject.center
@@ -121,15 +125,21 @@ def _place(options: argparse.Namespace, file: "SplatFile") -> Place:
     return made
 
 
-def _points(file: "SplatFile", rows: list[int]) -> np.ndarray:
+def _points(file: "SplatFile", rows: list[int]) -> "np.ndarray":
     """(k, 3) centres of file rows."""
+    import numpy as np
+
     for row in rows:
         if not 0 <= row < file.splats.n_splats:
             raise ValueError(f"{file.path.name} has rows 0 to {file.splats.n_splats - 1}, not {row}")
     return np.asarray(file.splats.means, np.float64)[rows]
 
 
-def _crop_box(crop: list[float]) -> PickedBox:
+def _crop_box(crop: list[float]) -> "PickedBox":
+    import numpy as np
+
+    from splap_editor.core.removal import PickedBox
+
     ends = np.array(crop).reshape(2, 3)
     size = ends[1] - ends[0]
     if not (size > 0.0).all() or not np.isfinite(ends).all():
