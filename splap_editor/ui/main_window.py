@@ -17,6 +17,7 @@ from splap_editor.session.autosave import Autosave
 from splap_editor.session.documents import Documents
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
+from splap_editor.tools.handle_tool import HandleTool
 from splap_editor.tools.select_tool import SelectOptions
 from splap_editor.tools.tool import ToolContext
 from splap_editor.tools.tool_manager import ToolManager
@@ -189,6 +190,7 @@ class MainWindow(FileDrop, QMainWindow):
         self.deformer_panel.weights.set_action(self.actions_["display.weights"])
         self.handles_panel.cage_form.previewed.connect(view.weights.preview_cage)
         self.tools.chosen_changed.connect(self._show_tool)
+        self.tools.chosen_changed.connect(self._show_first_steps)
         display.changed.connect(self._show_display)
 
     def _actions(self) -> ActionSet:
@@ -317,7 +319,7 @@ class MainWindow(FileDrop, QMainWindow):
         self.actions_.check({(0.0, 0.0, 1.0): "view.up_z", (0.0, -1.0, 0.0): "view.down_y"}.get(up, "view.up_y"))
         self.actions_.check("remove.show", False)
         self.display.apply(self.view)
-        self.overlay.show_hint(*(() if self._has_hinted else HINT))
+        self._show_first_steps()
         self._refresh()
 
     def _on_state_changed(self) -> None:
@@ -334,13 +336,19 @@ class MainWindow(FileDrop, QMainWindow):
         self._refresh()
 
     def _on_edit_changed(self) -> None:
-        edit = self.session.shown_scene.edit
-        if edit.handles and self.overlay.hint == HINT:
-            self.overlay.show_hint(HINT[1])
-        if edit.handles and not edit.is_identity:
-            self._has_hinted = True
-            self.overlay.show_hint()
+        self._show_first_steps()
         self._refresh()
+
+    def _show_first_steps(self) -> None:
+        """Say how to place and drag a first handle, as long as nobody did and the tool for it is in use."""
+        if self.session.scene is None:
+            return
+        edit = self.session.scene.edit
+        self._has_hinted |= bool(edit.handles) and not edit.is_identity
+        if self._has_hinted or self.tools.chosen.name != HandleTool.name:
+            self.overlay.show_hint()
+        else:
+            self.overlay.show_hint(*(HINT[1:] if edit.handles else HINT))
 
     def _on_viewport_resized(self) -> None:
         self.overlay.setGeometry(self.viewport.rect())

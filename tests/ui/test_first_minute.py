@@ -21,6 +21,10 @@ def arrow_pixel(driver, axis: int) -> QPoint:
 def test_click_drag_undo_and_export_give_a_file_with_what_was_on_screen(driver, qtbot, tmp_path):
     window, scene = driver.window, driver.scene
     assert window.overlay.hint == HINT
+    window.tools.choose("crop")
+    assert window.overlay.hint == (), "another tool has other first steps"
+    window.tools.choose("handle")
+    assert window.overlay.hint == HINT
 
     driver.click(driver.surface_pixel())
     assert [handle.name for handle in scene.edit.handles] == ["Handle 1"]
