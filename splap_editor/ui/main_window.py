@@ -119,7 +119,7 @@ class MainWindow(FileDrop, QMainWindow):
         self.documents, self.autosave = documents, autosave
         self._may_close = False
         self._keeps_edit = False
-        self._has_hinted = QSettings().value("hint/done", False, type=bool)
+        self._has_hinted = bool(QSettings().value("hint/done", False, type=bool))
         self.overlay = Overlay(context.hud, viewport)
         self.weight_legend = WeightLegend(view.weights, viewport)
         self.toast = Toast(viewport)
