@@ -9,6 +9,7 @@ from hypothesis import given, settings
 
 from splap_editor.io.ply import read_ply, write_ply
 from tests.campaign.checks import CHECKS
+from tests.campaign.display import display
 from tests.campaign.inputs import Found, try_inputs
 from tests.campaign.seeds import odd_plys
 from tests.campaign.writes import try_writes
@@ -18,9 +19,12 @@ N_WRITES = 48
 
 
 def test_no_input_breaks_anything():
-    found = try_inputs(20, range(N_INPUTS), inf, Found())
+    with display() as where:
+        found = try_inputs(20, range(N_INPUTS), inf, Found(), display=where, shown_share=100)
     assert found.failures == []
     assert found.counts["inputs"] == N_INPUTS
+    # Without Xvfb there is nowhere to open a window.
+    assert found.counts["windows"] >= 5 or where is None
     assert min(found.counts[f"{kind} accepted"] for kind in CHECKS) > 20
 
 

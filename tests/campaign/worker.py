@@ -6,6 +6,7 @@ import sys
 import tempfile
 import traceback
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -36,34 +37,43 @@ def input_of(seed: int, number: int, left_out: tuple[int, ...] = ()) -> tuple[by
     return mutated(data, kept), [mutation.__name__ for mutation, _ in kept]
 
 
+def written_input(folder: Path, seed: int, number: int, left_out: tuple[int, ...] = ()) -> Path:
+    """Write the input of a number to a file."""
+    data, _ = input_of(seed, number, left_out)
+    path = folder / f"scene.{SUFFIXES[kind_of(number)]}"
+    path.write_bytes(data)
+    return path
+
+
 def tried(folder: Path, seed: int, number: int, left_out: tuple[int, ...] = ()) -> str:
     """``"accepted"``, ``"refused"``, or a traceback."""
-    kind = kind_of(number)
-    data, _ = input_of(seed, number, left_out)
-    path = folder / f"scene.{SUFFIXES[kind]}"
-    path.write_bytes(data)
+    path = written_input(folder, seed, number, left_out)
     try:
         with warnings.catch_warnings():
             # A warning would stand on standard error.
             warnings.filterwarnings("error", module="splap_editor")
-            return "accepted" if CHECKS[kind](path, number) else "refused"
+            return "accepted" if CHECKS[kind_of(number)](path, number) else "refused"
     except Exception:
         return traceback.format_exc()
 
 
-def main() -> None:
-    """Answer a line ``number,left out…`` with a line."""
+def answer_lines(try_one: Callable[..., str], folder: Path, seed: int) -> None:
+    """Answer each line ``number,left out…`` with a line, under the memory limit."""
     with contextlib.suppress(ImportError):
         import resource
 
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
     os.environ.setdefault("SPLAP_CACHE_DIR", tempfile.gettempdir())
-    seed = int(sys.argv[1])
+    print("ready", flush=True)
+    for line in sys.stdin:
+        number, *left_out = map(int, line.split(","))
+        print(repr(try_one(folder, seed, number, tuple(left_out))), flush=True)
+
+
+def main() -> None:
+    """Try inputs."""
     with tempfile.TemporaryDirectory() as folder:
-        print("ready", flush=True)
-        for line in sys.stdin:
-            number, *left_out = map(int, line.split(","))
-            print(repr(tried(Path(folder), seed, number, tuple(left_out))), flush=True)
+        answer_lines(tried, Path(folder), int(sys.argv[1]))
 
 
 if __name__ == "__main__":
