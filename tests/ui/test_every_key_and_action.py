@@ -15,6 +15,7 @@ from splap_editor.core.pose import Pose
 from splap_editor.engine.keyframes import edit_at_frame, keyed_edit
 from splap_editor.session.pivot import Pivot
 from splap_editor.tools.brush_tool import BrushOptions
+from splap_editor.tools.floaters_tool import FloaterOptions
 from splap_editor.tools.handle_tool import HandleOptions
 from splap_editor.tools.pin_tool import PinOptions
 from splap_editor.tools.tool_table import TOOLS
@@ -177,6 +178,8 @@ def tool_state(driver):
         (context.held(BrushOptions).value, context.inspected.edge, driver.scene.picked),
         (window_tool(driver, "separate").parts, window_tool(driver, "separate").wider),
         (window_tool(driver, "join").parts, window_tool(driver, "join").steps),
+        (driver.scene.selection.tobytes(), tuple(window_tool(driver, "polygon").corners)),
+        (window_tool(driver, "crop").shape, driver.window.view.viewport.is_moving),
     )
 
 
@@ -196,6 +199,23 @@ def ready_for(driver, name, row, text):
         pair = int(rows[0]), int(rows[graph.indices[0]])
         context.inspected.pick(pair[0])
         context.inspected.pick_edge(pair)
+    elif name == "polygon":
+        size, ratio = driver.window.viewport.size(), driver.window.viewport.devicePixelRatioF()
+        width, height = size.width() * ratio, size.height() * ratio
+        # Round half of the picture: there is something to add, to take away and to keep.
+        window_tool(driver, name).corners = [(0.0, 0.0), (0.5 * width, 0.0), (0.5 * width, height), (0.0, height)]
+        driver.scene.set_selection(np.full(driver.scene.splats.n_splats, "Ctrl" in text))
+    elif name == "crop":
+        crop = window_tool(driver, name)
+        crop.begin()
+        crop.show(crop.shape.sized(crop.shape.center, crop.shape.halves))
+    elif name == "floaters":
+        finder = window_tool(driver, name)
+        finder.ask()
+        driver.qtbot.waitUntil(lambda: finder.search is not None, timeout=60_000)
+        likelihoods = np.sort(finder.search.floaters.likelihoods)
+        context.held(FloaterOptions).set(FloaterOptions(float(np.clip(1.0 - likelihoods[-30], 0.01, 0.99))))
+        driver.qtbot.waitUntil(lambda: not driver.window.view.viewport.is_moving, timeout=WAIT_MS)
     elif name in ("separate", "join") and text in ("Return", "Enter"):
         # With nothing pointed at, it is about the selection and the rest.
         driver.scene.set_selection(driver.scene.splats.means[:, 0] > 0.0)
