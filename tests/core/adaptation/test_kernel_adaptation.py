@@ -11,40 +11,9 @@ from splap_editor.core.progress import Cancelled
 from splap_editor.core.splats.occupancy import occupancy_ellipses
 from splap_editor.core.splats.rotations import quats_to_matrices
 from splap_editor.core.surface.geodesics import geodesic_neighbors
+from tests.core.adaptation.bound_scenes import SHIFT, TURN, bent, bound, deformation_by, rigid
 from tests.core.splat_scenes import ball, joined, moved, sheet, shuffled, splats_of
 from tests.reference.kernels import adapted_ellipse
-
-TURN = Rotation.from_rotvec([0.4, -1.1, 0.7])
-SHIFT = np.array([0.3, -2.0, 5.0])
-
-
-def bound(splats):
-    ellipses = occupancy_ellipses(splats)
-    graph = splat_graph(ellipses)
-    return KernelBinding(splats, ellipses, geodesic_neighbors(graph, 30), graph=graph)
-
-
-def deformation_by(binding, mapping, step=1e-6):
-    """What a smooth map of space does to the nodes; rotations are the polar factors of its derivative."""
-    rest = binding.ellipses.centers
-    columns = [(mapping(rest + step * e) - mapping(rest - step * e)) / (2.0 * step) for e in np.eye(3)]
-    left, _, right = np.linalg.svd(np.stack(columns, axis=2))
-    return Deformation(mapping(rest), left @ right)
-
-
-def rigid(binding, turn=TURN, shift=SHIFT, scale=1.0):
-    rest = binding.ellipses.centers
-    return Deformation(scale * turn.apply(rest) + shift, np.tile(turn.as_matrix(), (len(rest), 1, 1)))
-
-
-def bent(radius):
-    """Roll the plane z = 0 up around an axis along y."""
-
-    def mapping(points):
-        x, y, z = points.T
-        return np.stack([(radius - z) * np.sin(x / radius), y, radius - (radius - z) * np.cos(x / radius)], axis=1)
-
-    return mapping
 
 
 def covariances(splats):
@@ -459,53 +428,3 @@ def test_what_is_held_at_rest_keeps_its_bits_whatever_moves_beside_it():
         changed = adapted.changed[binding.ellipses.rows]
         assert changed[moving].any() and not changed[~moving].any()
         np.testing.assert_array_equal(adapted.means[binding.ellipses.rows][~moving], rest[~moving])
-
-
-def published_ellipse(binding, deformation, i):
-    """Centre and covariance of ellipse i by Eq. 10, corner by corner."""
-    ellipses, near = binding.ellipses, binding.neighborhoods
-    carriers = [i, *near.indices[near.indptr[i] : near.indptr[i] + 2]]
-    center, (v1, v2) = ellipses.centers[i], ellipses.semi_axes[i]
-    corners = []
-    for along, across in ((1.0, 0.0), (-0.5, np.sqrt(0.75)), (-0.5, -np.sqrt(0.75))):
-        corner = center + along * v1 + across * v2
-        weights = np.array([1.0 / np.linalg.norm(corner - ellipses.centers[j]) for j in carriers])
-        shifts = deformation.positions[carriers] - ellipses.centers[carriers]
-        corners.append(corner + weights @ shifts / weights.sum())
-    t1, t2, t3 = corners
-    mean = (t1 + t2 + t3) / 3.0
-    u, w = t1 - mean, (t2 - t3) / np.sqrt(3.0)
-    return mean, np.outer(u, u) + np.outer(w, w)
-
-
-def test_the_published_adaptation_is_its_formula_corner_by_corner():
-    binding = bound(ball(200))
-    deformation = deformation_by(binding, bent(1.5))
-    adapted = adapt_kernels(binding, deformation, method="paper")
-    ellipses = binding.ellipses
-    for i in range(0, ellipses.n_nodes, 7):
-        row = ellipses.rows[i]
-        mean, covariance = published_ellipse(binding, deformation, i)
-        np.testing.assert_allclose(adapted.means[row], mean, atol=1e-6)
-        axes = adapted.axes_f32[row] * ellipses.cutoffs[i]
-        np.testing.assert_allclose(axes.T @ axes, covariance, atol=1e-5 * np.trace(covariance))
-
-
-def test_the_published_adaptation_carries_a_shift_exactly_and_shrinks_what_turns():
-    binding = bound(ball(200))
-    shifted = adapt_kernels(binding, rigid(binding, Rotation.identity()), method="paper")
-    np.testing.assert_allclose(shifted.means, binding.splats.means + SHIFT, atol=1e-12)
-    np.testing.assert_allclose(shifted.log_scales, binding.splats.log_scales, atol=1e-6)
-    turned = adapt_kernels(binding, rigid(binding, Rotation.from_rotvec([0.0, 0.0, 2.5])), method="paper")
-    assert np.median(turned.log_scales - binding.splats.log_scales) < -0.01
-
-
-def test_the_published_adaptation_keeps_what_rests():
-    binding = bound(joined(sheet(100), sheet(100, height=3.0)))
-    rest = binding.ellipses.centers
-    moved = np.where((rest[:, 2] > 1.0)[:, None], rest + SHIFT, rest)
-    adapted = adapt_kernels(binding, Deformation(moved, np.tile(np.eye(3), (len(rest), 1, 1))), method="paper")
-    still = binding.splats.means[:, 2] < 1.0
-    np.testing.assert_array_equal(adapted.means[still], binding.splats.means[still])
-    assert not adapted.changed[still].any()
-    assert adapted.changed[~still].all()
