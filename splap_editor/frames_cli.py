@@ -115,7 +115,7 @@ def render(options: argparse.Namespace) -> int:
                 written = [output]
             else:
                 studio.pose(poser.kernels(None))
-                views = turntable_views(view, options.turntable, studio.viewport.camera.world_up)
+                views = turntable_views(view, options.turntable, studio.viewport.camera.up)
                 pictures = _drawn_round(studio, views, options.transparent, report)
                 written = _written_round(pictures, output, len(views), rate)
     finally:
@@ -154,7 +154,6 @@ def _studio(
 
     from splap_editor.viewport.camera import View
     from splap_editor.viewport.looks import background_named, look_named
-    from splap_editor.viewport.scene_view import suggested_up
     from splap_editor.viewport.studio import Studio
 
     # Without a display VTK warns before it draws by other means.
@@ -169,8 +168,9 @@ def _studio(
     hidden = session.hidden if session is not None and is_of_file else None
     studio = Studio(file.splats, look_named(display), width, height, hidden=hidden, removed=edit.removed)
     studio.viewport.set_background(*background_named(display))
+    studio.viewport.show_place(edit.place)
     if session is None or session.view is None:
-        return studio, studio.home(edit.place.rotation.T @ suggested_up(file.splats))
+        return studio, studio.home()
     spec = session.view
     studio.viewport.camera.world_up = np.array(spec.world_up)
     eye, focus, up = (np.array(v, np.float64) for v in (spec.position, spec.focal_point, spec.view_up))

@@ -1,11 +1,18 @@
-"""Where a whole scene stands: moved, turned and scaled about a point after everything else."""
+"""Where a whole scene stands: moved, turned and scaled about a point after everything else.
+
+Graph, handles, pins, removals and poses stay in the file's coordinates, so nothing of them is made anew when the place
+changes, and a placed scene bends as it would at rest: ``place(deform(x))``. A view shows the place by standing
+elsewhere itself, which turns view-dependent colour and splats of two scales rightly and costs nothing per splat.
+Numbers that a person sees and types are those of the placed scene (`placed_pose`, `placed_points`); recipes hold the
+file's.
+"""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.pose import LARGEST_COORDINATE, SCALES
+from splap_editor.core.pose import LARGEST_COORDINATE, SCALES, Pose
 from splap_editor.core.splats.rotations import matrices_to_quats, quat_products, quats_to_matrices
 from splap_editor.core.splats.splats import Splats
 
@@ -74,6 +81,55 @@ def placed_points(points: NDArray[np.floating], place: Place) -> NDArray[np.floa
     """(n, 3) points where the place puts them."""
     center = np.array(place.center)
     return (np.asarray(points, np.float64) - center) @ (place.scale * place.rotation).T + center + place.translate
+
+
+def file_points(points: NDArray[np.floating], place: Place) -> NDArray[np.float64]:
+    """(n, 3) points of the file that a place puts where these are: the inverse of `placed_points`."""
+    center = np.array(place.center)
+    moved = np.asarray(points, np.float64) - center - place.translate
+    return moved @ place.rotation / place.scale + center
+
+
+def placed_pose(pose: Pose, place: Place) -> Pose:
+    """The pose of a handle as seen in the placed scene: moved along and turned about its axes, in its units.
+
+    Scales along three axes stay those of the file: along others they would be no pose.
+    """
+    if place.is_identity:
+        return pose
+    return _turned_pose(pose, place.rotate, place.scale)
+
+
+def pose_in_file(pose: Pose, place: Place) -> Pose:
+    """The pose that `placed_pose` shows so."""
+    if place.is_identity:
+        return pose
+    w, x, y, z = place.rotate
+    return _turned_pose(pose, (w, -x, -y, -z), 1.0 / place.scale)
+
+
+def _turned_pose(pose: Pose, turn: tuple[float, float, float, float], scale: float) -> Pose:
+    back = np.array(turn) * [1.0, -1.0, -1.0, -1.0]
+    moved = scale * quats_to_matrices(np.array([turn]))[0] @ np.array(pose.translate)
+    quat = quat_products(quat_products(np.array([turn]), np.array([pose.rotate])), back[None])[0]
+    quat /= np.linalg.norm(quat)
+    return replace(pose, translate=tuple(moved.tolist()), rotate=tuple(quat.tolist()))
+
+
+def recentred_on(place: Place, center: NDArray[np.floating]) -> Place:
+    """The same similarity, written about another center (3,) of the file."""
+    at = placed_points(np.asarray(center)[None], place)[0]
+    return replace(
+        place, center=tuple(np.asarray(center, np.float64).tolist()), translate=tuple((at - center).tolist())
+    )
+
+
+def stood_up(
+    place: Place, before: NDArray[np.floating], after: NDArray[np.floating], center: NDArray[np.floating]
+) -> Place:
+    """Turn a place by as little as brings one direction (3,) to another, about a point (3,) of the file."""
+    a, b = (np.asarray(each, np.float64) / np.linalg.norm(each) for each in (before, after))
+    return place.followed_by(about(placed_points(np.asarray(center)[None], place)[0], turn=_turn_between(a, b)))
 
 
 def placed_splats(splats: Splats, place: Place) -> Splats:

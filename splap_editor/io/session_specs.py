@@ -52,7 +52,10 @@ class PinSettings:
 
 @dataclass(frozen=True)
 class ViewSpec:
-    """Where the camera stands: the fields of `splap_editor.viewport.camera.View`, and its turntable's axis."""
+    """Where the camera stands: the fields of `splap_editor.viewport.camera.View`, and its turntable's axis.
+
+    The view is in the file's coordinates, the axis in those of the placed scene.
+    """
 
     position: Vector
     focal_point: Vector

@@ -48,6 +48,26 @@ class ChangeEdit:
         self.scene.set_edit(self.before)
 
 
+@dataclass(eq=False)
+class StandUp(ChangeEdit):
+    """The whole scene was turned, so that up is elsewhere in it."""
+
+    up_before: tuple[float, float, float]
+    up_after: tuple[float, float, float]
+
+    def do(self) -> None:
+        """Turn it."""
+        self.scene.up = self.up_after
+        super().do()
+        self.scene.up_changed.emit()
+
+    def undo(self) -> None:
+        """Turn it back."""
+        self.scene.up = self.up_before
+        super().undo()
+        self.scene.up_changed.emit()
+
+
 class ChangeTogether:
     """Several changes as one step."""
 

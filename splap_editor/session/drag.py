@@ -1,7 +1,9 @@
 """Handles on their way: poses on screen that the history does not have yet."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
+from splap_editor.core.place import Place
 from splap_editor.core.pose import Pose
 from splap_editor.session.latest_job import Gate, LatestJob
 from splap_editor.session.stages import Ledger
@@ -40,6 +42,11 @@ class Drag:
         """Show handles, by their ids, at poses that are not in the history yet; the newest request wins."""
         scene = self._ledger.shown_scene
         scene.set_preview(scene.edit.with_poses(dict(poses)))
+
+    def preview_place(self, place: Place) -> None:
+        """Show the whole scene put elsewhere, which is not in the history yet."""
+        scene = self._ledger.shown_scene
+        scene.set_preview(replace(scene.edit, place=place))
 
     def commit(self, label: str) -> None:
         """Make the previewed poses one undoable step, and settle."""

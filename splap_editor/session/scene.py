@@ -42,6 +42,7 @@ class Scene:
         self.pivot = Pivot.MEDIAN
         self.pivot_at: NDArray[np.float64] | None = None
         self.picked: FileRow | None = None
+        self.up: tuple[float, float, float] = (0.0, 0.0, 1.0)
         self.surface_changed = Signal()
         self.edit_changed = Signal()
         self.preview_changed = Signal()
@@ -53,6 +54,7 @@ class Scene:
         self.active_handles_changed = Signal()
         self.pivot_changed = Signal()
         self.picked_changed = Signal()
+        self.up_changed = Signal()
 
     @property
     def splats(self) -> Splats:
@@ -161,6 +163,12 @@ class Scene:
         if at is not None:
             self.pivot_at = np.asarray(at, np.float64)
         self.pivot_changed.emit()
+
+    def set_up(self, up: tuple[float, float, float]) -> None:
+        """Say where up is in the placed scene; the view alone follows."""
+        if up != self.up:
+            self.up = up
+            self.up_changed.emit()
 
     def set_picked(self, row: FileRow | None) -> None:
         """Choose the splat that is inspected, by file row, or none."""

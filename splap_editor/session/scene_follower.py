@@ -23,6 +23,7 @@ class SceneHandlers(TypedDict, total=False):
     active_handles_changed: Handler
     pivot_changed: Handler
     picked_changed: Handler
+    up_changed: Handler
 
 
 class ShowsScene(Protocol):

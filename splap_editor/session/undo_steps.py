@@ -6,11 +6,13 @@ import numpy as np
 
 from splap_editor.core.handle_nodes import Region
 from splap_editor.core.index_spaces import FileMask
+from splap_editor.core.place import Place, stood_up
 from splap_editor.core.pose import Pose
+from splap_editor.core.removal import Vector
 from splap_editor.engine.edit import HANDLE_COLORS, Edit, Handle, Pin
 from splap_editor.engine.keyframes import auto_keyed_edit
 from splap_editor.engine.removal import Removal
-from splap_editor.session.commands import ChangeEdit, ChangeMask, ChangeTogether
+from splap_editor.session.commands import ChangeEdit, ChangeMask, ChangeTogether, StandUp
 from splap_editor.session.history import History
 from splap_editor.session.stages import Ledger
 
@@ -72,6 +74,21 @@ class UndoSteps:
         commands = ChangeEdit(scene, scene.edit, edit, label), ChangeMask(scene, "selection", selection, label)
         self._history.push(ChangeTogether(commands, label))
         return changed
+
+    def change_place(self, place: Place, label: str) -> None:
+        """Move, turn and scale the whole scene; no step if nothing changes."""
+        scene = self._ledger.shown_scene
+        if place != scene.edit.place:
+            self.change_edit(replace(scene.edit, place=place), label)
+
+    def stand_up(self, up: Vector) -> None:
+        """Turn the whole scene about its subject, so that what was up points along another axis of what is written."""
+        scene = self._ledger.shown_scene
+        if up == scene.up:
+            return
+        edit = scene.edit
+        place = stood_up(edit.place, np.array(scene.up), np.array(up), scene.ellipses.subject.center)
+        self._history.push(StandUp(scene, edit, replace(edit, place=place), "Change up axis", scene.up, up))
 
     def add_handle(self, region: Region, *, pose: Pose | None = None, name: str | None = None) -> Handle:
         """Place a handle, make it the active one, and prepare to move it, even if work was halted."""

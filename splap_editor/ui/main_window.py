@@ -79,6 +79,7 @@ CONTEXT_MENU = (
     "view.home",
 )
 LAYOUT_VERSION = 1
+UPS = {(0.0, 0.0, 1.0): "view.up_z", (0.0, 1.0, 0.0): "view.up_y", (0.0, -1.0, 0.0): "view.down_y"}
 
 
 class MainWindow(FileDrop, QMainWindow):
@@ -176,6 +177,7 @@ class MainWindow(FileDrop, QMainWindow):
             removed_changed=self._on_removed_changed,
             active_handles_changed=self._refresh,
             pivot_changed=self._show_pivot,
+            up_changed=self._show_up,
             surface_changed=self._refresh,
             edit_changed=self._on_edit_changed,
         )
@@ -313,10 +315,15 @@ class MainWindow(FileDrop, QMainWindow):
     def _show_pivot(self) -> None:
         self.actions_.check(f"handle.pivot_{self.session.shown_scene.pivot.value}")
 
+    def _show_up(self) -> None:
+        """Check the axis that is up; along another one the last of the three stays."""
+        action = UPS.get(self.session.shown_scene.up)
+        if action is not None:
+            self.actions_.check(action)
+
     def _on_scene_changed(self) -> None:
         self._show_pivot()
-        up = tuple(self.view.viewport.camera.world_up)
-        self.actions_.check({(0.0, 0.0, 1.0): "view.up_z", (0.0, -1.0, 0.0): "view.down_y"}.get(up, "view.up_y"))
+        self._show_up()
         self.actions_.check("remove.show", False)
         self.display.apply(self.view)
         self._show_first_steps()

@@ -30,6 +30,8 @@ class AxesTriad:
     def __init__(self, renderer: vtkRenderer, scale: float = 1.0):
         self._renderer = renderer
         self.scale = scale
+        self.axes = np.eye(3)
+        """(3, 3) rows X, Y, Z as directions of the scene that is drawn."""
         self.hovered: int | None = None
         self._lines = []
         for color in AXIS_COLORS:
@@ -51,11 +53,11 @@ class AxesTriad:
     def _ends(self, projection: Projection) -> NDArray[np.float64]:
         """(6, 3) ends +X +Y +Z -X -Y -Z: pixels from the top left, and height towards the viewer in pixels."""
         scale = self.scale
-        turned = _ENDS @ projection.view_from_world[:3, :3].T * [1.0, -1.0, 1.0] * _ARM_PX * scale
+        turned = _ENDS @ self.axes @ projection.view_from_world[:3, :3].T * [1.0, -1.0, 1.0] * _ARM_PX * scale
         return np.add(turned, (projection.width - _MARGIN_PX * scale, _MARGIN_PX * scale, 0.0))
 
     def hit(self, projection: Projection, x: float, y: float) -> NDArray[np.float64] | None:
-        """Unit world axis (3,) whose end is under the cursor, the nearer to the viewer of two; None beside all."""
+        """Unit axis (3,) whose end is under the cursor, the nearer to the viewer of two; None beside all."""
         self.hovered = None
         if self.is_shown:
             ends = self._ends(projection)

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 from vtkmodules.vtkCommonMath import vtkMatrix4x4
 from vtkmodules.vtkRenderingCore import vtkCamera, vtkRenderer
 
+from splap_editor.core.place import Place, file_points, placed_points
 from splap_editor.viewport.projection import Projection
 
 # Nearer than this share of the farthest point nothing is drawn: a 24-bit depth buffer resolves no more.
@@ -219,11 +220,14 @@ class Camera:
     renderer : vtkRenderer
         Its active camera is driven.
     world_up : (3,) float
-        Axis of the turntable; captures are often y-down: (0, -1, 0).
+        Axis of the turntable in the placed scene; captures are often y-down: (0, -1, 0).
+
+    Views are in the file's coordinates; up, and the axes looked along, are those of the placed scene.
     """
 
     def __init__(self, renderer: vtkRenderer, world_up: ArrayLike = (0.0, 0.0, 1.0)):
         self._renderer = renderer
+        self.place = Place()
         self.is_turntable = True
         self.world_up = np.asarray(world_up, np.float64)
         self.home = View(np.array([2.0, -3.0, 1.5]), np.zeros(3), self.world_up)
@@ -257,10 +261,39 @@ class Camera:
         vtk.SetParallelProjection(view.is_parallel)
         vtk.SetParallelScale(view.half_height)
 
+    @property
+    def axes(self) -> NDArray[np.float64]:
+        """(3, 3) rows X, Y, Z of the placed scene in the file's coordinates."""
+        return self.place.rotation
+
+    @property
+    def up(self) -> NDArray[np.float64]:
+        """(3,) where up is in the file's coordinates."""
+        return self.world_up @ self.axes
+
+    def show_place(self, place: Place, about: ArrayLike | None = None) -> None:
+        """Look at the scene put elsewhere.
+
+        Parameters
+        ----------
+        place : Place
+        about : (3,) float, optional
+            Point of the file that keeps its place and size in the picture: the camera goes along with it, but does not
+            turn. None: the camera stays where it is in the placed scene, which moves before it.
+        """
+        before, view, self.place = self.place, self.view, place
+        if about is not None:
+            self.view = _turned(view, place.rotation.T @ before.rotation, np.asarray(about, np.float64))
+            return
+        turn = place.rotation.T @ before.rotation
+        ends = placed_points(np.stack([view.position, view.focal_point]), before)
+        eye, focus = file_points(ends, place)
+        self.view = replace(view, position=eye, focal_point=focus, view_up=turn @ view.view_up)
+
     def orbit(self, dx_px: float, dy_px: float, about: ArrayLike | None = None) -> None:
         """Turn by a pointer move (y down): once across the height of the picture is half a turn."""
         per_px = np.pi / max(self._renderer.GetSize()[1], 1)
-        up = self.world_up if self.is_turntable else None
+        up = self.up if self.is_turntable else None
         self.view = orbited(self.view, dx_px * per_px, dy_px * per_px, up, about)
 
     def pan(self, dx_px: float, dy_px: float, point: ArrayLike | None = None) -> None:
@@ -289,8 +322,9 @@ class Camera:
         return framed(self.view, points, max(width, 1) / max(height, 1), room=room)
 
     def look_from(self, axis: ArrayLike) -> View:
-        """View from the side that a world axis (3,) points to."""
-        return axis_view(self.view, axis, self.world_up)
+        """View from the side that an axis (3,) of the placed scene points to."""
+        R, origin = self.axes, np.zeros(3)
+        return _turned(axis_view(_turned(self.view, R, origin), axis, self.world_up), R.T, origin)
 
     def set_parallel(self, is_parallel: bool) -> None:
         """Orthographic or perspective; what is at the focal point keeps its size."""

@@ -65,6 +65,12 @@ class Gizmo:
         Device pixels per logical pixel.
     is_muted : bool
         No part is shown or found, but the one that is dragged by key.
+    world_axes : (3, 3) float64
+        Columns X, Y, Z of the world in the coordinates that are drawn.
+    unit : float
+        A world unit in these coordinates: what numbers, typed and told, and steps are in.
+    carries_all : bool
+        What is dragged is the whole scene: the coordinates that are drawn go along with the drag.
     size_px, grab_px : float
         Length of an arrow and reach of the cursor in logical pixels.
     angle_snap_rad, scale_snap : float
@@ -79,6 +85,9 @@ class Gizmo:
     grab_px: float = 8.0
     angle_snap_rad: float = np.radians(5.0)
     scale_snap: float = 0.1
+    world_axes: NDArray[np.float64] = field(default_factory=lambda: np.eye(3))
+    unit: float = 1.0
+    carries_all: bool = False
     frame: NDArray[np.float64] | None = None
     hovered: Part | None = None
     typed: float | None = None
@@ -110,9 +119,13 @@ class Gizmo:
     def axes(self) -> NDArray[np.float64]:
         """(3, 3) unit axes as columns, in the chosen orientation."""
         if self._drag:
-            return self._drag.axes
+            if not self.carries_all:
+                return self._drag.axes
+            # What is drawn turns with the drag; the axes stay where they are.
+            A = self.delta[:3, :3]
+            return (A / np.cbrt(np.linalg.det(A))).T @ self._drag.axes
         if not self.is_local:
-            return np.eye(3)
+            return self.world_axes
         u, _, vt = np.linalg.svd(self._attached[:3, :3])
         return u @ vt if np.linalg.det(u @ vt) > 0 else u @ np.diag([1.0, 1.0, -1.0]) @ vt
 
@@ -120,7 +133,7 @@ class Gizmo:
     def shown_frame(self) -> NDArray[np.float64]:
         """(4, 4) frame where the gizmo is drawn: it travels with a drag, but neither turns nor scales."""
         shown = (self._drag.frame if self._drag else self._attached).copy()
-        if self._drag and self._drag.part.act is Act.TRANSLATE:
+        if self._drag and self._drag.part.act is Act.TRANSLATE and not self.carries_all:
             shown[:3, 3] += self.delta[:3, 3]
         return shown
 
@@ -194,6 +207,8 @@ class Gizmo:
         """Start a drag of a part, or a keyboard transform (G, R, S: `DOT`, `VIEW_RING`, `SCALE_BOX`)."""
         if not self.is_shown:
             raise ValueError("the gizmo is attached to nothing")
+        # Before the axes are asked for: of a drag that is bound anew they are those at its start.
+        self.delta, self.amount = np.eye(4), 0.0
         sight = line_of_sight(projection, self._attached[:3, 3])
         axes = self.axes
         axis = projection.direction if part.lock is Lock.VIEW else axes[:, part.axis]
@@ -202,7 +217,7 @@ class Gizmo:
         start = np.array([x, y], np.float64)
         self._drag = _Drag(part, projection, self._attached.copy(), axes, axis, start)
         self._pointer, self._virtual, self._is_fine, self._turns = start, start, False, 0.0
-        self.delta, self.amount, self.typed = np.eye(4), 0.0, None
+        self.typed = None
 
     def bind(self, lock: Lock, axis: int = 2) -> NDArray[np.float64]:
         """Bind the drag under way to an axis or a plane (X, Shift+X …) or free it again; yields the delta."""
@@ -255,14 +270,14 @@ class Gizmo:
         drag, projection = self._dragging, self._dragging.projection
         if self.typed is not None:
             axis = drag.axes[:, 0] if drag.part.lock is Lock.VIEW else drag.axis
-            self.amount, shift = self.typed, self.typed * axis
+            self.amount, shift = self.typed, self.typed * self.unit * axis
         elif drag.part.lock is Lock.AXIS:
             first, last = (projection.on_line(x, y, drag.origin, drag.axis) for x, y in (drag.start, self._virtual))
             amount = last - first
             if snap:
                 step = self._translation_step()
                 amount = round(amount / step) * step
-            self.amount, shift = amount, amount * drag.axis
+            self.amount, shift = amount / self.unit, amount * drag.axis
         else:
             begin, end = (projection.on_plane(x, y, drag.origin, drag.axis) for x, y in (drag.start, self._virtual))
             shift = end - begin
@@ -272,14 +287,15 @@ class Gizmo:
                 if drag.part.lock is Lock.PLANE:
                     local[drag.part.axis] = 0.0
                 shift = drag.axes @ local
-            self.amount = float(np.linalg.norm(shift))
+            self.amount = float(np.linalg.norm(shift)) / self.unit
         delta = np.eye(4)
         delta[:3, 3] = shift
         return delta
 
     def _translation_step(self) -> float:
         drag = self._dragging
-        return float(10.0 ** np.round(np.log10(drag.projection.world_per_pixel(drag.origin) * 40.0 * self.scale)))
+        about = drag.projection.world_per_pixel(drag.origin) * 40.0 * self.scale
+        return float(self.unit * 10.0 ** np.round(np.log10(about / self.unit)))
 
     def _rotation(self, snap: bool) -> NDArray[np.float64]:
         drag = self._dragging

@@ -136,6 +136,7 @@ class SceneView:
         self._paints: dict[str, NDArray[np.uint8]] = {}
         self._marks: tuple[tuple[FileRows, tuple[int, int, int, int]], ...] = ()
         self._view_job = LatestJob(session.view_worker, "view")
+        self._is_dragged = False
         self._seen = SeenFrom(np.zeros(3), np.array([0.0, 0.0, -1.0], np.float32), False)
         viewport.splats.view_turned = self._on_view_turned
         session.prepare_for(self)
@@ -147,8 +148,9 @@ class SceneView:
             hidden_changed=self._show_flags,
             removed_changed=self._show_removed,
             surface_changed=self._show_subject,
-            edit_changed=self._show_handles,
-            preview_changed=self._show_handles,
+            edit_changed=self._show_edit,
+            preview_changed=self._show_edit,
+            up_changed=self._show_place,
             active_handles_changed=self._show_handles,
             pivot_changed=self._show_handles,
         )
@@ -272,7 +274,9 @@ class SceneView:
         assert depicted is not None
         self.viewport.splats.load(depicted.rest, depicted.colors, scene.ellipses.subject, depicted.by_contribution)
         self.viewport.splats.set_subject(scene.ellipses.subject, scene.edit.removed)
-        self.viewport.camera.world_up = np.array(self.preferred_up or suggested_up(scene.splats), np.float64)
+        scene.up = self.preferred_up or suggested_up(scene.splats)
+        self.viewport.camera.world_up = np.array(scene.up, np.float64)
+        self.viewport.show_place(scene.edit.place)
         self.viewport.reset_camera()
         self._show_flags()
         self._show_handles()
@@ -319,6 +323,29 @@ class SceneView:
         scene = self._shown
         if scene is not None:
             self.viewport.splats.set_subject(scene.ellipses.subject, scene.edit.removed)
+
+    def _show_edit(self) -> None:
+        self._show_place()
+        self._show_handles()
+
+    def _show_place(self) -> None:
+        """Put the scene where the edit says.
+
+        What a pointer drags moves before a camera at rest. With any other change the camera goes along, so that the
+        subject keeps its place and size in the picture; where up was moved along with the scene all of it stays.
+        """
+        scene, camera = self._shown, self.viewport.camera
+        if scene is None:
+            return
+        place, was_dragged = scene.shown_edit.place, self._is_dragged
+        self._is_dragged = scene.preview is not None
+        stands_up = not np.array_equal(scene.up, camera.world_up)
+        camera.world_up = np.array(scene.up, np.float64)
+        if place != camera.place:
+            view, is_dragged = camera.view, self._is_dragged or was_dragged
+            self.viewport.show_place(place, None if is_dragged else scene.ellipses.subject.center)
+            if stands_up:
+                camera.view = view
 
     def _show_handles(self) -> None:
         scene, viewport = self._shown, self.viewport

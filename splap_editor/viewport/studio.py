@@ -68,9 +68,9 @@ class Studio:
         self.viewport.close()
         self._window.Finalize()
 
-    def home(self, up: NDArray[np.float64] | None = None) -> View:
+    def home(self) -> View:
         """View of the whole scene at rest, from the side and from above, as the window opens with."""
-        self.viewport.camera.world_up = np.array(suggested_up(self._splats)) if up is None else np.asarray(up)
+        self.viewport.camera.world_up = np.array(suggested_up(self._splats))
         self.viewport.reset_camera()
         return self.viewport.camera.view
 
@@ -99,6 +99,6 @@ class Studio:
         self.viewport.splats.set_colors(rgba_bytes(rgb, splats.opacities))
 
 
-def turntable_views(view: View, n: int, world_up: NDArray[np.float64]) -> list[View]:
+def turntable_views(view: View, n: int, up: NDArray[np.float64]) -> list[View]:
     """``n`` views once round the focal point at equal angles, the first the given one; the scene turns to the right."""
-    return [orbited(view, 2.0 * np.pi * i / n, 0.0, world_up) for i in range(n)]
+    return [orbited(view, 2.0 * np.pi * i / n, 0.0, up) for i in range(n)]

@@ -11,6 +11,7 @@ from vtkmodules.vtkCommonCore import vtkCommand
 from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow
 
 from splap_editor.core.index_spaces import FileMask
+from splap_editor.core.place import Place
 from splap_editor.viewport.axes_triad import AxesTriad
 from splap_editor.viewport.cage_outline import CageOutline
 from splap_editor.viewport.camera import Camera, View, box_corners
@@ -168,6 +169,13 @@ class Viewport:
         """The camera was moved: show it."""
         self.request_render()
 
+    def show_place(self, place: Place, about: NDArray[np.float64] | None = None) -> None:
+        """Show the scene put elsewhere, its axes in the corner and at the gizmo too; see `Camera.show_place`."""
+        self.camera.show_place(place, about)
+        self.triad.axes = place.rotation
+        self.gizmo.world_axes, self.gizmo.unit = place.rotation.T, 1.0 / place.scale
+        self.request_render()
+
     def reset_camera(self) -> None:
         """Look at the main subject from its home side: slightly from above, a quarter to the side."""
         actor = self.splats.shown
@@ -176,6 +184,8 @@ class Viewport:
         up = self.camera.world_up / np.linalg.norm(self.camera.world_up)
         side = np.eye(3)[np.argmin(np.abs(up))]
         toward = 0.55 * side + 0.80 * np.cross(side, up) + 0.38 * up
+        axes = self.camera.axes
+        toward, up = toward @ axes, up @ axes
         home = replace(self.camera.home, position=actor.origin + toward, focal_point=actor.origin, view_up=up)
         self.camera.view = replace(home, is_parallel=self.camera.view.is_parallel)
         self.camera.view = self.camera.home = self.frame()
@@ -247,7 +257,7 @@ class Viewport:
         self.request_render()
 
     def hover_axes(self, xy: tuple[float, float] | None) -> NDArray[np.float64] | None:
-        """Light up the end of the corner axes under the cursor: the world axis (3,) to look from on a click."""
+        """Light up the end of the corner axes under the cursor: the axis (3,) to look from on a click."""
         before = self.triad.hovered
         axis = self.triad.hit(self.projection, *(xy or (np.nan, np.nan)))
         if self.triad.hovered != before:

@@ -5,7 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from splap_editor.core.place import Place, fitted_plane, levelled, placed_points, placed_splats, recentred, sized
+from splap_editor.core.place import (
+    Place,
+    file_points,
+    fitted_plane,
+    levelled,
+    placed_points,
+    placed_pose,
+    placed_splats,
+    pose_in_file,
+    recentred,
+    recentred_on,
+    sized,
+    stood_up,
+)
+from splap_editor.core.pose import Pose
 from splap_editor.core.splats.rotations import quats_to_matrices
 from splap_editor.core.splats.spherical_harmonics import view_colors
 from splap_editor.core.splats.splats import Splats
@@ -91,3 +105,31 @@ def test_a_measured_length_and_a_centre_come_out_as_asked():
 def test_points_on_a_line_are_no_floor():
     with pytest.raises(ValueError, match="do not lie on a line"):
         fitted_plane(np.outer(np.arange(4.0), [1.0, 2.0, 3.0]))
+
+
+def test_file_points_are_where_placed_points_come_from():
+    points = np.random.default_rng(5).normal(size=(20, 3))
+    np.testing.assert_allclose(file_points(placed_points(points, PLACE), PLACE), points, atol=1e-12)
+
+
+def test_a_pose_is_shown_as_what_it_does_in_the_placed_scene():
+    pose, center = Pose((0.2, -0.1, 0.4), (0.5, 0.5, -0.5, 0.5), 1.5), np.array([0.1, 0.7, -0.3])
+    seen, there = placed_pose(pose, PLACE), placed_points(center[None], PLACE)[0]
+    np.testing.assert_allclose(seen.matrix(there) @ PLACE.matrix, PLACE.matrix @ pose.matrix(center), atol=1e-12)
+    back = pose_in_file(seen, PLACE)
+    np.testing.assert_allclose(back.matrix(center), pose.matrix(center), atol=1e-12)
+    assert placed_pose(pose, Place()) is pose and pose_in_file(pose, Place((1.0, 2.0, 3.0))) is pose
+
+
+def test_a_place_about_another_center_is_the_same_place():
+    np.testing.assert_allclose(recentred_on(PLACE, np.array([3.0, -1.0, 2.0])).matrix, PLACE.matrix, atol=1e-12)
+
+
+@pytest.mark.parametrize("after", [(0, 0, 1), (0, -1, 0), (1, 0, 0)])
+def test_standing_up_brings_one_axis_to_another_about_a_point_that_stays(after):
+    before, at = np.array([0.0, 1.0, 0.0]), np.array([0.4, 0.2, 0.1])
+    stood = stood_up(PLACE, before, np.array(after), at)
+    np.testing.assert_allclose(placed_points(at[None], stood), placed_points(at[None], PLACE), atol=1e-12)
+    turn = stood.rotation @ PLACE.rotation.T
+    np.testing.assert_allclose(turn @ before, after, atol=1e-12)
+    assert stood.scale == pytest.approx(PLACE.scale)

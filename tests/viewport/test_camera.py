@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow
 
+from splap_editor.core.place import Place, placed_points
 from splap_editor.viewport.camera import (
     Camera,
     View,
@@ -210,3 +211,37 @@ def test_framing_leaves_the_points_alone(n):
     before = points.copy()
     framed(VIEW, points, 1.5)
     np.testing.assert_array_equal(points, before)
+
+
+PLACE = Place((0.3, -0.1, 0.2), (1.0, 2.0, -0.5), (0.8, 0.2, -0.4, 0.4), 2.5)
+
+
+def in_picture(camera, points):
+    return camera.projection().pixels(points)
+
+
+def test_a_camera_at_rest_sees_placed_points_where_one_of_the_placed_scene_would(camera):
+    points = np.random.default_rng(3).normal(size=(20, 3))
+    expected = in_picture(camera, placed_points(points, PLACE))
+    camera.show_place(PLACE)
+    np.testing.assert_allclose(in_picture(camera, points), expected, atol=1e-6)
+    camera.show_place(Place())
+    np.testing.assert_allclose(camera.view.position, VIEW.position, atol=1e-12)
+
+
+def test_a_camera_that_goes_along_keeps_a_point_and_the_size_of_what_turns_about_it(camera):
+    at = np.array([0.2, 0.1, 0.3])
+    around = at + 0.3 * np.random.default_rng(4).normal(size=(20, 3))
+    before, turned = in_picture(camera, at[None]), at + (around - at) @ PLACE.rotation.T
+    expected = in_picture(camera, turned)
+    camera.show_place(PLACE, at)
+    np.testing.assert_allclose(in_picture(camera, at[None]), before, atol=1e-6)
+    np.testing.assert_allclose(in_picture(camera, around), expected, atol=1e-6)
+
+
+def test_the_turntable_and_views_along_axes_are_those_of_the_placed_scene(camera):
+    camera.show_place(PLACE)
+    camera.orbit(40.0, -25.0)
+    assert frame_of(camera.view)[:, 0] @ camera.up == pytest.approx(0.0, abs=1e-9)
+    for axis in (*np.eye(3), -np.eye(3)[2]):
+        np.testing.assert_allclose(PLACE.rotation @ camera.look_from(axis).direction, -axis, atol=1e-9)

@@ -278,3 +278,29 @@ def test_acts_that_are_off_are_neither_shown_nor_hit(projection):
     origin, size = gizmo.frame[:3, 3], gizmo.arm_length(projection)
     assert gizmo.hit(projection, *projection.pixel(origin)) is None
     assert gizmo.hit(projection, *projection.pixel(origin + VIEW_RING_RADIUS * size * projection.right)) == VIEW_RING
+
+
+@pytest.mark.parametrize("part", [ARROWS[0], RINGS[2], SCALE_BOX], ids=["arrow", "ring", "box"])
+def test_a_gizmo_that_carries_everything_stays_on_what_it_carries_and_its_axes_in_the_world(projection, part):
+    gizmo = Gizmo(carries_all=True)
+    gizmo.attach(frame_at())
+    start = projection.pixel(frame_at()[:3, 3]) + np.array([50.0, 3.0])
+    delta = drag(gizmo, part, projection, start, start + np.array([30.0, 25.0]))
+    assert not np.allclose(delta, np.eye(4))
+    gizmo.begin(part, projection, *start)
+    gizmo.move(*(start + np.array([30.0, 25.0])))
+    np.testing.assert_allclose(gizmo.shown_frame[:3, 3], frame_at()[:3, 3], atol=1e-12)
+    turned = gizmo.delta[:3, :3] / np.cbrt(np.linalg.det(gizmo.delta[:3, :3]))
+    np.testing.assert_allclose(turned @ gizmo.axes, np.eye(3), atol=1e-12)
+
+
+def test_numbers_are_in_units_of_the_world(projection):
+    gizmo = Gizmo(unit=0.5, world_axes=turn([0, 0, 1], 0.3))
+    gizmo.attach(frame_at())
+    gizmo.begin(ARROWS[0], projection, *projection.pixel(frame_at()[:3, 3]))
+    delta = gizmo.type(3.0)
+    np.testing.assert_allclose(delta[:3, 3], 1.5 * turn([0, 0, 1], 0.3)[:, 0], atol=1e-12)
+    assert gizmo.amount == 3.0
+    gizmo.type(None)
+    shift = gizmo.move(*(projection.pixel(frame_at()[:3, 3]) + np.array([80.0, 0.0])))[:3, 3]
+    assert gizmo.amount == pytest.approx(float(shift @ gizmo.axes[:, 0]) / 0.5)

@@ -122,7 +122,7 @@ class DocumentActions:
         if session.view is not None:
             spec, camera = session.view, self._viewport.camera
             eye, focus, up = (np.array(v, np.float64) for v in (spec.position, spec.focal_point, spec.view_up))
-            camera.world_up = np.array(spec.world_up, np.float64)
+            self._session.shown_scene.set_up(_vector(spec.world_up))
             camera.is_turntable = spec.is_turntable
             camera.view = View(eye, focus, up, spec.angle, spec.is_parallel)
             self._viewport.camera_moved()

@@ -1,7 +1,5 @@
 """Copying, pasting and mirroring the poses of the chosen handles."""
 
-import numpy as np
-
 from splap_editor.core.pose import Pose
 from splap_editor.core.splats.symmetry import Plane, object_center, symmetry_plane
 from splap_editor.session.jobs import Job
@@ -76,7 +74,9 @@ class PoseActions:
         self._session.worker.submit(Job("symmetry", "Looking for the symmetry of the object", look, done))
 
     def _mirror_across(self, axis: int) -> None:
-        self._mirror(Plane(object_center(self._session.shown_scene.ellipses.centers), np.eye(3)[axis]))
+        scene = self._session.shown_scene
+        # Row by row the axes of the placed scene in the file's coordinates.
+        self._mirror(Plane(object_center(scene.ellipses.centers), scene.edit.place.rotation[axis]))
 
     def _mirror(self, plane: Plane) -> None:
         scene = self._session.shown_scene

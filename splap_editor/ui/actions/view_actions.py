@@ -126,19 +126,19 @@ class ViewActions(QObject):
         self._viewport.camera.is_turntable = on
 
     def up_z(self) -> None:
-        """Stand the scene on its XY plane."""
+        """Look at the scene as standing on its XY plane."""
         self._stand((0.0, 0.0, 1.0))
 
     def up_y(self) -> None:
-        """Stand the scene on its XZ plane."""
+        """Look at the scene as standing on its XZ plane."""
         self._stand((0.0, 1.0, 0.0))
 
     def down_y(self) -> None:
-        """Stand the scene on its XZ plane, upside down, as most captures want it."""
+        """Look at the scene as standing on its XZ plane, upside down, as most captures want it."""
         self._stand((0.0, -1.0, 0.0))
 
     def _stand(self, up: tuple[float, float, float]) -> None:
-        self._viewport.camera.world_up = np.array(up)
+        self._session.shown_scene.set_up(up)
         self._viewport.reset_camera()
         self._viewport.camera_moved()
 

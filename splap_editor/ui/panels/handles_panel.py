@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QFrame, QGridLayout, QScrollArea, QVBoxLayout, QWi
 
 from splap_editor.core.handle_nodes import region_nodes
 from splap_editor.core.options import world_length
+from splap_editor.core.place import Place, placed_pose, pose_in_file
 from splap_editor.core.pose import Pose
 from splap_editor.core.reach_options import CageOptions
 from splap_editor.engine.edit import Handle, Pin
@@ -48,8 +49,9 @@ class HandlesPanel(QWidget):
         self._counted: dict[int, tuple[object, int]] = {}
         self.list = self._made_list()
         self.pose_form = PoseForm()
-        self.pose_form.changed.connect(self._on_pose_changed)
-        self.pose_form.previewed.connect(lambda pose: self._preview(pose))
+        self.pose_form.setToolTip("Along the axes in the corner, in the units of the placed object.")
+        self.pose_form.changed.connect(lambda pose: self._on_pose_changed(self._in_file(pose)))
+        self.pose_form.previewed.connect(lambda pose: self._preview(self._in_file(pose)))
         self.cage_form = CageForm()
         self.cage_form.changed.connect(self._on_cage_changed)
         self.pivot = Choice(toolTip="What several handles turn and scale about; Shift + right click places the point.")
@@ -151,7 +153,9 @@ class HandlesPanel(QWidget):
         handle, scene = self._chosen(), self._scene
         unit = scene.ellipses.scene_scale if scene is not None else 1.0
         self.pose_form.setEnabled(handle is not None)
-        self.pose_form.show_pose(handle.pose if handle is not None else Pose(), unit)
+        place = scene.shown_edit.place if scene is not None else Place()
+        pose = placed_pose(handle.pose, place) if handle is not None else Pose()
+        self.pose_form.show_pose(pose, place.scale * unit)
         self.cage_form.setVisible(scene is not None and scene.edit.deformer.has_weights)
         self.cage_form.setEnabled(handle is not None)
         if handle is not None:
@@ -235,6 +239,10 @@ class HandlesPanel(QWidget):
     def delete_pin(self, pin_id: int) -> None:
         """Delete a pin as one undoable step."""
         self._session.steps.change_edit(self._session.shown_scene.edit.without_pins((pin_id,)), "Delete pin")
+
+    def _in_file(self, pose: Pose) -> Pose:
+        """Pose that is shown so."""
+        return pose_in_file(pose, self._session.shown_scene.edit.place)
 
     def _preview(self, pose: Pose) -> None:
         self._session.drag.preview({self._session.shown_scene.active_handles[-1]: pose})

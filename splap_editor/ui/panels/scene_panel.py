@@ -63,7 +63,7 @@ class ScenePanel(QWidget):
         self.oddities = OdditiesList(session)
         layout.addWidget(self.layout_form)
         layout.addWidget(self.oddities)
-        SceneFollower(session, self._on_scene_changed, surface_changed=self._show_surface)
+        SceneFollower(session, self._on_scene_changed, surface_changed=self._show_surface, edit_changed=self._show_size)
         self._on_scene_changed()
 
     def _on_scene_changed(self) -> None:
@@ -84,7 +84,7 @@ class ScenePanel(QWidget):
         degree = splats.sh_degree
         self.facts["colour"].setText(f"view-dependent, degree {degree}" if degree else "the same from every side")
         self.facts["reading"].setText(reading(file.layout, splats))
-        self.facts["size"].setText(f"{scene.ellipses.scene_scale:.4g} units")
+        self._show_size()
         words, tone = verdict(splats)
         self.facts["trust"].setText(words)
         set_tone(self.facts["trust"], tone)
@@ -93,7 +93,16 @@ class ScenePanel(QWidget):
         self.warnings.setVisible(bool(file.warnings))
         self._show_surface()
 
+    def _show_size(self) -> None:
+        """Tell the size as it is written; where that is another one, the file's too."""
+        scene = self._scene
+        if scene is not None:
+            size, scale = scene.ellipses.scene_scale, scene.shown_edit.place.scale
+            file = "" if scale == 1.0 else f", {size:.4g} in the file"
+            self.facts["size"].setText(f"{scale * size:.4g} units{file}")
+
     def _show_surface(self) -> None:
+        self._show_size()
         surface = self._scene.surface if self._scene is not None else None
         if surface is None:
             self.facts["surface"].setText("not prepared yet")

@@ -121,7 +121,7 @@ def _draw(desk: "_Desk", order: FrameOrder, poses: FramePoser, fps: float, job: 
     kernels = poses.kernels(None)
 
     def turned() -> Iterator[NDArray[np.uint8]]:
-        for number, view in enumerate(turntable_views(desk.view, len(frames), desk.world_up), start=1):
+        for number, view in enumerate(turntable_views(desk.view, len(frames), desk.up), start=1):
             yield desk.picture(job, kernels, view)
             progress(number / len(frames))
 
@@ -139,7 +139,7 @@ class _Desk:
 
     def __init__(self, splats: Splats, viewport: Viewport, order: FrameOrder, scene: Scene) -> None:
         self.view = viewport.camera.view
-        self.world_up = np.array(viewport.camera.world_up)
+        self.up = viewport.camera.up
         self._is_transparent = order.is_transparent
         self._splats, self._hidden, self._size = splats, scene.hidden, order.size
         self._removed = scene.edit.removed
