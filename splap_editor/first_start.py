@@ -13,9 +13,11 @@ from splap_editor.warm_up import Compilation, load_view_loops
 class FirstStart(QObject):
     """Compiles what the program is made of, beside a window that stays alive, and says how far that is.
 
-    Until it is done the picture is drawn by the loops' plain twins; the
-    camera moves, splats are selected and handles placed, but no surface is
-    prepared. Ends by itself, or with the window.
+    Until a drag finds its loops compiled, the camera moves, splats are
+    selected and handles placed, but no surface is prepared. The others follow
+    while the window is used; what needs one of them sooner compiles it itself.
+    Until the last is done the picture is drawn by the loops' plain twins. Ends
+    by itself, or with the window.
 
     Parameters
     ----------
@@ -33,6 +35,7 @@ class FirstStart(QObject):
         super().__init__(window)
         self._session, self._viewport, self._view = window.session, window.viewport, window.view
         self._tell = tell
+        self._can_drag = False
         self._loop_done.connect(self._on_loop_done)
         self.compilation = Compilation(self._loop_done.emit)
         self.job = Job("compile", f"Getting ready for {name}, once on this computer", lambda job: None)
@@ -54,15 +57,17 @@ class FirstStart(QObject):
             self.compilation.start()
 
     def _on_loop_done(self) -> None:
-        self._show()
-        if self.compilation.is_done:
-            self.compilation.close()
-            self.compilation.keep()
-            session = self._session
-            session.told_job.set_elsewhere(None)
-            load = Job("load", "", lambda job: load_view_loops())
-            load.done = load.failed = load.stopped = lambda *_: session.release()
-            session.view_worker.submit(load)
+        session, compilation = self._session, self.compilation
+        if not self._can_drag:
+            self._show()
+            if compilation.can_drag:
+                self._can_drag = True
+                session.told_job.set_elsewhere(None)
+                session.release()
+        if compilation.is_done:
+            compilation.close()
+            compilation.keep()
+            session.view_worker.submit(Job("load", "", lambda job: load_view_loops()))
 
     def _show(self) -> None:
         share = self.compilation.share
@@ -70,5 +75,5 @@ class FirstStart(QObject):
         # An empty share would look like work of unknown length.
         self.job.share = max(share, 1e-3)
         self.job.stage = f"{share:.0%}"
-        if not self.compilation.is_done and self._session.state != "halted":
+        if not self.compilation.can_drag and self._session.state != "halted":
             self._session.told_job.set_elsewhere(self.job)

@@ -45,12 +45,15 @@ class Loop:
         Processor time that compiling it took where the table was made; of interest is its share of the whole.
     group : int
         Loops with the same number share inner loops, and are compiled by one process, in their order.
+    first : bool
+        A first handle and its drag wait for it; the others are compiled after these, and at a lower priority.
     """
 
     loop: str
     types: str
     seconds: float
     group: int
+    first: bool
 
     def compile(self) -> None:
         """Compile it for these types, or load it if that has been done."""
@@ -110,10 +113,11 @@ class Compilation:
         self._told = told
         self._wanted = tuple(loops() if wanted is None else wanted)
         self._command = tuple(command)
-        # The longest first, so that no process is left alone with it at the end.
-        self._queue = deque(sorted(_grouped(self._wanted), key=_seconds, reverse=True))
-        self._n_left = len(self._wanted)
-        self._left_s = _seconds(self._wanted)
+        self._first = tuple(loop for loop in self._wanted if loop.first)
+        # The longest first, so that no process is left alone with it at the end; but what a drag waits for before all.
+        groups = sorted(_grouped(self._wanted), key=_seconds, reverse=True)
+        self._queue = deque(sorted(groups, key=lambda group: not group[0].first))
+        self._left = set(self._wanted)
         self._failed = False
         self._lock = threading.Lock()
         self._processes: list[subprocess.Popen] = []
@@ -132,13 +136,15 @@ class Compilation:
 
     @property
     def share(self) -> float:
-        """How much of the work is done, 0 to 1: each loop counts as much as it costs."""
-        return 1.0 - self._left_s / max(_seconds(self._wanted), 1e-9) if self._n_left else 1.0
+        """How much of what a drag waits for is done, 0 to 1: each loop counts as much as it costs."""
+        if self.can_drag:
+            return 1.0
+        return 1.0 - _seconds(self._left.intersection(self._first)) / max(_seconds(self._first), 1e-9)
 
     @property
     def n_done(self) -> int:
         """How many loops are compiled."""
-        return len(self._wanted) - self._n_left
+        return len(self._wanted) - len(self._left)
 
     @property
     def n_loops(self) -> int:
@@ -146,9 +152,14 @@ class Compilation:
         return len(self._wanted)
 
     @property
+    def can_drag(self) -> bool:
+        """Whether everything is done that a first handle and its drag wait for."""
+        return self._left.isdisjoint(self._first)
+
+    @property
     def is_done(self) -> bool:
         """Whether nothing is left to do."""
-        return self._n_left == 0
+        return not self._left
 
     def keep(self) -> None:
         """Note for later starts that everything is compiled, unless something could not be."""
@@ -176,8 +187,8 @@ class Compilation:
                     answer = _answer(process, self._wanted.index(loop))
                     with self._lock:
                         self._failed |= answer != "done"
-                        self._n_left -= 1
-                        self._left_s -= loop.seconds
+                        # A set of its own, for those who look at it meanwhile.
+                        self._left = self._left - {loop}
                     self._told()
         finally:
             # One that has ended leaves words in the pipe that nobody will read.
@@ -205,9 +216,9 @@ def _pipes(process: subprocess.Popen[str]) -> tuple[IO[str], IO[str]]:
 
 
 def _grouped(wanted: Iterable[Loop]) -> list[list[Loop]]:
-    groups: dict[int, list[Loop]] = {}
+    groups: dict[tuple[int, bool], list[Loop]] = {}
     for loop in wanted:
-        groups.setdefault(loop.group, []).append(loop)
+        groups.setdefault((loop.group, loop.first), []).append(loop)
     return list(groups.values())
 
 
@@ -224,9 +235,15 @@ def _stamp() -> Path:
 
 def _obey(lines: Iterable[str], say: Callable[[str], Any]) -> None:
     """Compile the loops that are asked for by their numbers, one a line."""
+    is_polite = not hasattr(os, "nice")
     for line in lines:
         try:
-            loops()[int(line)].compile()
+            loop = loops()[int(line)]
+            if not loop.first and not is_polite:
+                # Somebody may be dragging by now.
+                os.nice(10)
+                is_polite = True
+            loop.compile()
         except Exception as error:  # whatever it is, the program compiles the loop where it is called
             say(f"failed: {error}".replace("\n", " "))
         else:

@@ -1,8 +1,10 @@
 """Calls every compiled loop of the program with the types that it has there."""
 
+from typing import Any
+
 import numpy as np
 
-from splap_editor.core.adaptation.kernel_adaptation import adapted_splats
+from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels, adapted_splats
 from splap_editor.core.adaptation.options import AdaptationOptions
 from splap_editor.core.arap.options import ArapOptions
 from splap_editor.core.bbw.levels import Level, coarser_level
@@ -19,10 +21,15 @@ from splap_editor.core.splats.splats import Splats
 from splap_editor.core.surface.geodesics import geodesic_distances
 from splap_editor.engine.bound_edit import bind, ready_for_drags
 from splap_editor.engine.edit import Edit, Handle, Pin, Pose
-from splap_editor.engine.surface import surface_of
+from splap_editor.engine.surface import Surface, surface_of
 from splap_editor.io.ply_header import ply_header
 from splap_editor.io.ply_lists import list_table
 from tests.reference.ply import ply_bytes, splat_columns
+
+
+def call_first_loops() -> None:
+    """Call those that a first handle and its drag wait for: prepare, bind, drag, settle, and drag on."""
+    _drag(surface_of(_sheet(), GraphOptions()), Edit().method)
 
 
 def call_every_loop() -> None:
@@ -30,21 +37,12 @@ def call_every_loop() -> None:
     splats = _sheet()
     surface = surface_of(splats, GraphOptions())
     surface_of(splats, GraphOptions(rule="paper"))
-    ready_for_drags(surface)
-    handles = (Handle(1, "", "#ffffff", Region(surface.rest[0], 0.1), Pose((0.0, 0.0, 0.3), (0.9, 0.1, 0.2, 0.3))),)
-    pins = (Pin(1, "", Region(surface.rest[-1], 0.1)),)
     for method in method_titles():
-        edit = Edit(handles, pins, method, OptionSet(ReachOptions(None)))
-        bound = bind(surface, edit)
-        bound.drag(edit)
-        kernels = bound.pose().kernels
-        # A drag that goes on from a settled pose takes another path.
-        bound.drag(edit)
+        kernels = _drag(surface, method)
     adapted_splats(splats, kernels)
     contributions(splats, surface.ellipses)
     for method, options in CHOICES:
-        edit = Edit(handles, pins, method, OptionSet(ReachOptions(None), options))
-        bind(surface, edit).pose()
+        bind(surface, _edit(surface, method, options)).pose()
     normal_offsets(surface.ellipses, surface.graph.edges[:4])
     touch_scales(surface.ellipses, surface.graph.edges[:4], 0.0)
     geodesic_distances(surface.graph, np.array([0]))
@@ -53,6 +51,25 @@ def call_every_loop() -> None:
     coarser_level(Level(surface.rest, surface.L, surface.M, np.arange(n), np.zeros(0, np.int64)), np.zeros(n, np.bool_))
     _read_lists()
     _look(splats)
+
+
+def _edit(surface: Surface, method: str, *options: Any) -> Edit:
+    pose = Pose((0.0, 0.0, 0.3), (0.9, 0.1, 0.2, 0.3))
+    handle = Handle(1, "", "#ffffff", Region(surface.rest[0], 0.1), pose)
+    pin = Pin(1, "", Region(surface.rest[-1], 0.1))
+    return Edit((handle,), (pin,), method, OptionSet(ReachOptions(None), *options))
+
+
+def _drag(surface: Surface, method: str) -> AdaptedKernels:
+    ready_for_drags(surface)
+    edit = _edit(surface, method)
+    bound = bind(surface, edit)
+    bound.drag(edit)
+    kernels = bound.pose().kernels
+    # A drag that goes on from a settled pose takes another path.
+    bound.drag(edit)
+    assert kernels is not None
+    return kernels
 
 
 CHOICES = (

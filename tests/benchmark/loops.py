@@ -3,7 +3,8 @@
     python -m tests.benchmark.loops > resources/loops.json
 
 Compiles into an empty cache, so it takes a minute. A row is a loop, the types that the program calls it with, the
-seconds of processor time that it took here, and the group of loops that call each other.
+seconds of processor time that it took here, the group of loops that call each other, and whether a first handle and its
+drag wait for it.
 """
 
 import json
@@ -97,12 +98,20 @@ def main() -> None:
     recorder = Recorder()
     listener = type("Listener", (event.Listener,), {"on_start": recorder.on_start, "on_end": recorder.on_end})()
     with event.install_listener("numba:compile", listener):
-        from tests.every_loop import call_every_loop
+        from tests.every_loop import call_every_loop, call_first_loops
 
+        call_first_loops()
+        first = set(recorder.rows)
         call_every_loop()
     groups = recorder.groups()
     rows = [
-        {"loop": loop, "types": kinds, "seconds": round(max(seconds, 0.01), 2), "group": groups[loop]}
+        {
+            "loop": loop,
+            "types": kinds,
+            "seconds": round(max(seconds, 0.01), 2),
+            "group": groups[loop],
+            "first": (loop, kinds) in first,
+        }
         for (loop, kinds), seconds in recorder.rows.items()
     ]
     print("[\n" + ",\n".join(json.dumps(row) for row in rows) + "\n]")

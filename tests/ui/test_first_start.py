@@ -8,7 +8,7 @@ import sys
 from splap_editor.app import open_first
 from splap_editor.core.twofold_loop import TwofoldLoop
 from splap_editor.resources import resource
-from splap_editor.warm_up import Compilation
+from splap_editor.warm_up import Compilation, is_warm, loops
 
 FIRST_PICTURE = """
 import json, sys
@@ -87,11 +87,34 @@ def test_what_is_asked_for_meanwhile_is_made_once_everything_is_compiled(empty_w
         assert not TwofoldLoop.uses_compiled and session.state == "opening"
         assert empty_window.deformer_panel.state.text() == "Opening the file."
         qtbot.waitUntil(lambda: session.state == "ready", timeout=60_000)
-        assert TwofoldLoop.uses_compiled
+        qtbot.waitUntil(lambda: TwofoldLoop.uses_compiled, timeout=60_000)
     finally:
         TwofoldLoop.use_compiled(True)
     assert shares == sorted(shares) and shares[0] == 0.0 and shares[-1] == 1.0
     assert ("compile", "Getting ready for tube.ply, once on this computer") in jobs
+
+
+def test_a_drag_waits_for_no_loop_that_it_does_not_call(empty_window, qtbot, monkeypatch):
+    later = tuple(i for i, loop in enumerate(loops()) if not loop.first)
+    assert later
+    # Loops that a drag does not call are never done.
+    answers = f"import sys, time\nfor line in sys.stdin: time.sleep(600 * (int(line) in {later})); print(1, flush=True)"
+    command = (sys.executable, "-c", answers)
+    monkeypatch.setattr("splap_editor.first_start.Compilation", lambda told: Compilation(told, command=command))
+    shares, jobs, session = [], [], empty_window.session
+    session.told_job.changed.connect(lambda job: jobs.append(job and job.kind))
+    try:
+        first = open_first(empty_window, resource("samples", "tube.ply"), shares.append)
+        qtbot.waitUntil(lambda: session.state == "ready", timeout=60_000)
+        assert first.compilation.can_drag and not first.compilation.is_done
+        assert shares[-1] == 1.0 and jobs[-1] is None
+        # Pictures owe nothing to what is still being compiled.
+        assert not TwofoldLoop.uses_compiled
+        empty_window._may_close = True
+        empty_window.close()
+    finally:
+        TwofoldLoop.use_compiled(True)
+    assert not is_warm()
 
 
 def test_a_window_closed_meanwhile_ends_the_processes(empty_window, qtbot, monkeypatch):
