@@ -5,7 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.graph.splat_graph import SplatGraph
-from splap_editor.core.surface.shortest_paths import heap_add, heap_replace_first, settle, twice_as_long
+from splap_editor.core.surface.shortest_paths import heap_add, heap_replace_first, settle, take
 
 
 def farthest_nodes(graph: SplatGraph, count: int) -> NDArray[np.int64]:
@@ -110,42 +110,10 @@ def _farthest(seeds, indptr, indices, lengths, count):
 
 @nb.njit(nogil=True, cache=True)
 def _spread_samples(samples, indptr, indices, lengths, limit, near, distances):
-    """Dijkstra from all samples at once in which a node may be reached by k of them."""
-    n, k = near.shape
-    counts = np.zeros(n, np.int32)
-    # An item is node · m + sample.
-    m_samples = max(1, samples.size)
+    """Search from all samples at once; each of them is a label, and a node keeps the k that reach it first."""
+    n_labels = max(1, samples.size)
     keys, items = np.empty(samples.size + 1024), np.empty(samples.size + 1024, np.int64)
-    size = 0
     for sample in range(samples.size):
-        heap_add(keys, items, size, 0.0, samples[sample] * m_samples + sample)
-        size += 1
-    while size > 0:
-        key, item = keys[0], items[0]
-        size -= 1
-        heap_replace_first(keys, items, size, keys[size], items[size])
-        i, sample = item // m_samples, item % m_samples
-        count = counts[i]
-        if count == k or _is_near(near[i], count, sample):
-            continue
-        near[i, count] = sample
-        distances[i, count] = key
-        counts[i] = count + 1
-        for m in range(indptr[i], indptr[i + 1]):
-            j = indices[m]
-            distance = key + lengths[m]
-            if distance > limit or counts[j] == k or _is_near(near[j], counts[j], sample):
-                continue
-            if size == len(keys):
-                keys, items = twice_as_long(keys), twice_as_long(items)
-            heap_add(keys, items, size, distance, j * m_samples + sample)
-            size += 1
-
-
-@nb.njit(nogil=True, cache=True)
-def _is_near(near, count, sample):
-    """Whether a sample is among the first ``count`` that reached a node."""
-    for c in range(count):  # noqa: SIM110 - compiled: a generator would be slow
-        if near[c] == sample:
-            return True
-    return False
+        take(distances[samples[sample]], near[samples[sample]], 0.0, sample)
+        heap_add(keys, items, sample, 0.0, samples[sample] * n_labels + sample)
+    settle(indptr, indices, lengths, limit, distances, keys, items, samples.size, None, None, near, n_labels)
