@@ -126,6 +126,7 @@ def make_window(cache: StageCache | None = None) -> MainWindow:
     autosave = Autosave(documents, mailbox.post)
     context = ToolContext(session, viewport, InspectView(session, view))
     context.paint = partial(view.paint, layer="tool")
+    context.claim = view.claim_gizmo
     tools = made_tools(context)
     widget.connect_tools(tools.pointer, tools.key)
     window = MainWindow(session, documents, autosave, widget, view, context, tools, Display())

@@ -208,11 +208,32 @@ def levelled(place: Place, floor: NDArray[np.floating], up: NDArray[np.floating]
     ValueError
         The points lie on a line.
     """
-    middle, normal = fitted_plane(placed_points(floor, place))
+    return laid_level(place, *fitted_plane(floor), up, above)
+
+
+def laid_level(
+    place: Place,
+    middle: NDArray[np.floating],
+    normal: NDArray[np.floating],
+    up: NDArray[np.floating],
+    above: NDArray[np.floating],
+) -> Place:
+    """Turn a place by as little as makes a plane level, about a point of it.
+
+    Parameters
+    ----------
+    place : Place
+    middle, normal : (3,) float
+        The plane, in the file's coordinates; the side of its unit normal means nothing.
+    up, above : (3,) float
+        As of `levelled`.
+    """
+    at = placed_points(np.asarray(middle)[None], place)[0]
+    toward = place.rotation @ normal
     upward = np.asarray(up, np.float64) / np.linalg.norm(up)
-    if normal @ (placed_points(np.asarray(above)[None], place)[0] - middle) < 0.0:
-        normal = -normal
-    return place.followed_by(about(middle, turn=_turn_between(normal, upward)))
+    if toward @ (placed_points(np.asarray(above)[None], place)[0] - at) < 0.0:
+        toward = -toward
+    return place.followed_by(about(at, turn=_turn_between(toward, upward)))
 
 
 def _turn_between(a: NDArray[np.float64], b: NDArray[np.float64]) -> tuple[float, float, float, float]:

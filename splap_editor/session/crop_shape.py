@@ -110,6 +110,12 @@ class CropShape:
         turn = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
         return replace(self, axes=self.axes @ turn.T)
 
+    def carried(self, delta: NDArray[np.float64]) -> CropShape:
+        """Move and turn it by a rigid transform (4, 4)."""
+        center = delta[:3, :3] @ self.center + delta[:3, 3]
+        center = np.clip(center, -LARGEST_COORDINATE, LARGEST_COORDINATE)
+        return replace(self, center=center, axes=self.axes @ delta[:3, :3].T)
+
     def sized(self, center: NDArray[np.float64], sides: NDArray[np.float64]) -> CropShape:
         """Put it elsewhere, with sides (3,) of other lengths; of a ball, the first one is its diameter."""
         halves = 0.5 * np.asarray(sides, np.float64)
@@ -118,11 +124,14 @@ class CropShape:
         return replace(self, center=np.asarray(center, np.float64), halves=halves)
 
 
-def shape_about(subject: MainSubject, kind: CropKind) -> CropShape:
-    """A shape with a little room about the main subject; a plane through its middle, across the third axis."""
-    extent = np.abs(subject.corners - subject.center).max(axis=0)
+def shape_about(subject: MainSubject, kind: CropKind, axes: NDArray[np.float64] | None = None) -> CropShape:
+    """A shape with a little room about the main subject; a plane through its middle, across the third axis.
+
+    Its sides go along the rows of a rotation ``axes`` (3, 3), by default the axes of the file.
+    """
+    axes = np.eye(3) if axes is None else axes
+    extent = np.abs((subject.corners - subject.center) @ axes.T).max(axis=0)
     halves = _ROOM * np.maximum(extent, 1e-6 * max(subject.size, 1e-6))
-    axes = np.eye(3)
     if kind is CropKind.PLANE:
         axes, halves = axes[[2, 0, 1]], halves[[2, 0, 1]]
     elif kind is CropKind.BALL:

@@ -8,11 +8,14 @@ from numpy.typing import NDArray
 
 from splap_editor.core.index_spaces import FileMask
 from splap_editor.core.options import Choice, option
+from splap_editor.core.place import file_points, placed_points
 from splap_editor.core.removal import RemovalStep, picked_splats
 from splap_editor.session.crop_shape import CropKind, CropShape, shape_about
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.tools.bindings import Binding
 from splap_editor.tools.tool import KeyEvent, PointerEvent, Tool, ToolContext
+from splap_editor.viewport.gizmo import Claim
+from splap_editor.viewport.gizmo_parts import Act
 
 GRAB_PX = 14.0
 GOES_TINT = (229, 72, 77, 150)
@@ -45,7 +48,7 @@ class CropOptions:
 
 @dataclass(frozen=True)
 class CropNumbers:
-    """Where the shape is, in the file's units.
+    """Where the shape is in the placed scene, along the axes in the corner.
 
     Parameters
     ----------
@@ -95,38 +98,75 @@ class CropStroke:
         self.tool.show(self.before)
 
 
+class CropMover:
+    """Moves and turns the shape by the gizmo at its middle."""
+
+    def __init__(self, tool: "CropTool") -> None:
+        self._tool = tool
+        self._before: CropShape | None = None
+
+    def begin(self) -> bool:
+        """Remember the shape."""
+        self._before = self._tool.shape
+        return self._before is not None
+
+    def show(self, delta: NDArray[np.float64]) -> None:
+        """Move what it was at the start."""
+        if self._before is not None:
+            self._tool.show(self._before.carried(delta))
+
+    def take(self, act: Act) -> None:
+        """Leave it there."""
+        if self._tool.shape is not None:
+            self._tool.show(self._tool.shape)
+
+    def drop(self) -> None:
+        """Put the shape from before back."""
+        if self._before is not None and self._tool.shape is not None:
+            self._tool.show(self._before)
+
+
 class CropTool(Tool):
     """The shape shows when the pointer enters; Return removes what is tinted in one step, Escape leaves it all."""
 
     name = "crop"
     option_kinds: ClassVar[tuple[type, ...]] = (CropOptions, CropNumbers)
-    mutes_gizmo = True
 
     def __init__(self, context: ToolContext) -> None:
         super().__init__(context)
         self.shape: CropShape | None = None
+        self.mover = CropMover(self)
         self._lit: int | None = None
         self._is_dismissed = False
         self._options, self._numbers = context.held(CropOptions), context.held(CropNumbers)
         self._options.changed.connect(self._on_options)
         self._numbers.changed.connect(self._on_numbers)
-        SceneFollower(context.session, self.drop, removed_changed=self._redraw)
+        SceneFollower(context.session, self.drop, removed_changed=self._redraw, edit_changed=self._on_place)
 
     # Shape --------------------------------------------------------------------------------------------------------
 
     def show(self, shape: CropShape) -> None:
         """Show a shape, tint what would go, and say how much that is."""
         self.shape = shape
-        sides = 2.0 * shape.halves
-        values = [float(np.float32(value)) for value in (*shape.center, *sides)]
-        self._numbers.set(CropNumbers(*values))
+        self._show_numbers(shape)
         self._redraw()
+        self.context.claim(self.claim)
+
+    @property
+    def claim(self) -> Claim:
+        """A gizmo at the middle of the shape, but for what its kind cannot do."""
+        if self.shape is None:
+            return Claim(None)
+        frame = np.eye(4)
+        frame[:3, :3], frame[:3, 3] = self.shape.axes.T, self.shape.center
+        acts = {Act.TRANSLATE} if self.shape.kind is CropKind.BALL else {Act.TRANSLATE, Act.ROTATE}
+        return Claim(frame, frozenset(acts))
 
     def begin(self) -> None:
         """Show a shape about the subject."""
         self._is_dismissed = False
-        kind = CropKind(self._options.value.kind)
-        self.show(shape_about(self.context.session.shown_scene.ellipses.subject, kind))
+        scene = self.context.session.shown_scene
+        self.show(shape_about(scene.ellipses.subject, CropKind(self._options.value.kind), scene.edit.place.rotation))
 
     def drop(self) -> None:
         """Show no shape, and no tint."""
@@ -137,6 +177,7 @@ class CropTool(Tool):
                 viewport.rings.hide(name)
             self.context.paint(None)
             self.context.hud.show()
+            self.context.claim(self.claim)
             viewport.request_render()
 
     def goes(self) -> FileMask:
@@ -230,13 +271,24 @@ class CropTool(Tool):
         else:
             self._redraw()
 
+    def _show_numbers(self, shape: CropShape) -> None:
+        place = self.context.session.shown_scene.edit.place
+        values = (*placed_points(shape.center[None], place)[0], *(2.0 * place.scale * shape.halves))
+        self._numbers.set(CropNumbers(*(float(np.float32(value)) for value in values)))
+
+    def _on_place(self) -> None:
+        if self.shape is not None:
+            self._show_numbers(self.shape)
+
     def _on_numbers(self) -> None:
         if self.shape is None:
             return
+        place = self.context.session.shown_scene.edit.place
         x, y, z, *sides = (getattr(self._numbers.value, name) for name in ("x", "y", "z", "width", "depth", "height"))
-        shape = self.shape.sized(np.array([x, y, z]), np.array(sides))
+        center = file_points(np.array([[x, y, z]]), place)[0]
+        shape = self.shape.sized(center, np.array(sides) / place.scale)
         was = np.concatenate([self.shape.center, self.shape.halves])
-        # Shown numbers are rounded; only what someone entered makes another shape.
+        # Shown numbers are rounded to single precision; only what someone entered makes another shape.
         if not np.allclose(np.concatenate([shape.center, shape.halves]), was, rtol=1e-6, atol=1e-9):
             self.show(shape)
 

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 from splap_editor.session.session import Session
 from splap_editor.session.signals import Signal
 from splap_editor.tools.bindings import Binding, answering, gesture_name, held_modifiers, hint_of, key_names
+from splap_editor.tools.mover import Mover
 from splap_editor.viewport.camera import View
+from splap_editor.viewport.gizmo import Claim
 from splap_editor.viewport.inspect_view import InspectView
 from splap_editor.viewport.viewport import Viewport
 
@@ -150,6 +152,10 @@ class ToolContext:
         Brings the camera to a view; a host that can animate it says how.
     paint : callable
         Lays colours (N, 4) uint8, the fourth their share, over the splats; None takes them off again.
+    claim : callable
+        Has the gizmo stand where the tool in use wants it; None: at the chosen handles.
+    mover : Mover, optional
+        What it then moves; None: the handles.
     left_orbits : bool
         A left drag without Shift or Ctrl is one too, except where it draws.
     """
@@ -161,6 +167,8 @@ class ToolContext:
     orbit: Callable[[PointerEvent], Stroke | None] = lambda press: None
     fly_to: Callable[[View], None] = field(init=False)
     paint: Callable[[NDArray[np.uint8] | None], None] = lambda colors: None
+    claim: Callable[[Claim | None], None] = lambda claim: None
+    mover: Mover | None = None
     left_orbits: bool = False
     _held: dict[type, Held] = field(default_factory=dict)
 
@@ -194,6 +202,8 @@ class Tool:
     needs_scene: ClassVar[bool] = True
     yields_to_orbit: ClassVar[bool] = False
     mutes_gizmo: ClassVar[bool] = False
+    mover: Mover | None = None
+    """What the gizmo moves while the tool is in use, if not handles."""
 
     def __init__(self, context: ToolContext) -> None:
         self.context = context
@@ -205,6 +215,14 @@ class Tool:
     def is_active(self) -> bool:
         """Whether `active_bindings` hold."""
         return False
+
+    @property
+    def claim(self) -> Claim | None:
+        """Where the gizmo stands while the tool is in use, if not at the chosen handles."""
+        return None
+
+    def taken_up(self) -> None:
+        """Begin: the tool is in use from here on."""
 
     @property
     def hint(self) -> str:

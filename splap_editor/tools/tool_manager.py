@@ -66,7 +66,9 @@ class ToolManager:
             self.chosen.left()
             self._chosen = name
             self.context.viewport.gizmo.is_muted = self.chosen.mutes_gizmo
-            self.context.viewport.gizmo_changed()
+            self.context.mover = self.chosen.mover
+            self.context.claim(self.chosen.claim)
+            self.chosen.taken_up()
             self.chosen_changed.emit()
             self._tell_hint()
 

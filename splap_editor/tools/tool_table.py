@@ -13,8 +13,11 @@ from splap_editor.tools.handle_tool import HandleTool
 from splap_editor.tools.inspect_tool import InspectTool
 from splap_editor.tools.join_tool import JoinTool
 from splap_editor.tools.lasso_tool import LassoTool
+from splap_editor.tools.level_tool import LevelTool
+from splap_editor.tools.measure_tool import MeasureTool
 from splap_editor.tools.navigate_tool import NavigateTool
 from splap_editor.tools.pin_tool import PinTool
+from splap_editor.tools.place_tool import PlaceTool
 from splap_editor.tools.polygon_tool import PolygonTool
 from splap_editor.tools.rectangle_tool import RectangleTool
 from splap_editor.tools.separate_tool import SeparateTool
@@ -70,6 +73,9 @@ TOOLS: tuple[ToolEntry, ...] = (
     ToolEntry(PinTool, "&Pin", "E", "Click the surface to hold it in place.", "Place handles and pins"),
     ToolEntry(CropTool, "Cr&op", "Shift+B", "Remove what is outside or inside of a box, sphere or plane.", "Clean up"),
     ToolEntry(FloatersTool, "&Floaters", "Shift+F", "Find haze, clumps and specks, and remove them.", "Clean up"),
+    ToolEntry(PlaceTool, "Plac&e", "T", "Move, turn and scale the whole object.", "Set upright"),
+    ToolEntry(LevelTool, "Le&vel", "Shift+T", "Click the floor that the object shall stand level on.", "Set upright"),
+    ToolEntry(MeasureTool, "Meas&ure", "M", "Measure between two splats, and set a true size.", "Set upright"),
     ToolEntry(SeparateTool, "&Separate", "", "Draw over two parts to take them apart.", "Mend the surface"),
     ToolEntry(JoinTool, "&Join", "", "Draw across a gap to tie its two rims together.", "Mend the surface"),
     ToolEntry(InspectTool, "&Inspect", "I", "See a splat's card and neighbours, or an edge's.", "Inspect"),

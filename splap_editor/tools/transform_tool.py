@@ -1,14 +1,14 @@
-"""Moving handles: the gizmo, and G / R / S with axis locks and typed numbers; choosing handles and pins."""
+"""Moving handles, or what the tool in use moves: the gizmo, and G / R / S with axis locks and typed numbers."""
 
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.pose import Pose
 from splap_editor.engine.edit import Handle, Pin
 from splap_editor.session.pivot import Pivot
 from splap_editor.tools.bindings import Binding
+from splap_editor.tools.mover import HandleMover, Mover
 from splap_editor.tools.pin_stroke import PinStroke
 from splap_editor.tools.tool import KeyEvent, PointerEvent, Tool, ToolContext
 from splap_editor.viewport.gizmo_parts import DOT, SCALE_BOX, VIEW_RING, Act, Lock, Part
@@ -17,22 +17,23 @@ MARKER_REACH_PX = 11.0
 
 _KEY_PARTS = {"G": DOT, "R": VIEW_RING, "S": SCALE_BOX}
 _AXES = {"X": 0, "Y": 1, "Z": 2}
-_LABELS = {Act.TRANSLATE: "Move handle", Act.ROTATE: "Turn handle", Act.SCALE: "Scale handle"}
 
 
 class TransformTool(Tool):
     """Stands before the chosen tool: a press on the gizmo, on a handle's marker, or a transform under way by key.
 
-    Poses are worked out from those at the start of the drag, never from the
+    It moves the chosen handles, or what the tool in use says. All is worked out
+    from the state at the start of the drag, never from the
     frame before. Moves are previews; the release is one step of the history,
-    Escape and the right button bring the old poses back.
+    Escape and the right button bring the old state back.
     """
 
     name = "transform"
 
     def __init__(self, context: ToolContext) -> None:
         super().__init__(context)
-        self._starts: dict[int, tuple[Handle, Pose]] = {}
+        self._handles = HandleMover(context.session)
+        self._moving: Mover | None = None
         self._by_key = False
         self._typed = ""
         self._xy = (0.0, 0.0)
@@ -41,7 +42,7 @@ class TransformTool(Tool):
     @property
     def is_active(self) -> bool:
         """Whether a drag or a transform by key is under way."""
-        return bool(self._starts)
+        return self._moving is not None
 
     def pointer(self, event: PointerEvent) -> bool:
         """Drag the gizmo, choose handles by their markers, finish what a key began."""
@@ -69,21 +70,20 @@ class TransformTool(Tool):
         return used or (self.is_active and event.pressed and not (event.ctrl or event.alt))
 
     def cancel(self) -> None:
-        """Bring the poses from before the drag back."""
+        """Bring the state from before the drag back."""
         super().cancel()
-        if self.is_active:
+        moving = self._moving
+        if moving is not None:
             self.context.viewport.gizmo.cancel()
             self._finish()
-            self.context.session.drag.cancel()
+            moving.drop()
 
     # At rest ------------------------------------------------------------------------------------------------------
 
     def grab(self, event: PointerEvent) -> bool:
         """Begin to drag the part of the gizmo under the cursor."""
         part = self.context.viewport.gizmo_part(*event.xy)
-        if part is not None:
-            self._begin(part, event.xy, by_key=False)
-        return part is not None
+        return part is not None and self._begin(part, event.xy, by_key=False)
 
     def start(self, event: KeyEvent) -> bool:
         """Begin to move, turn or scale with the pointer; of what is under way by key, another of them."""
@@ -91,9 +91,9 @@ class TransformTool(Tool):
             if not self._by_key:
                 return False
             self.cancel()
-        if self._active_handles():
-            self._begin(_KEY_PARTS[event.key], self._xy, by_key=True)
-        return self.is_active
+        part = _KEY_PARTS[event.key]
+        gizmo = self.context.viewport.gizmo
+        return gizmo.is_shown and part.act in gizmo.acts and self._begin(part, self._xy, by_key=True)
 
     # Under way ----------------------------------------------------------------------------------------------------
 
@@ -140,23 +140,23 @@ class TransformTool(Tool):
             lock, axis = Lock.VIEW, 2
         self._show(gizmo.bind(lock, axis))
 
-    def _begin(self, part: Part, xy: tuple[float, float], *, by_key: bool) -> None:
-        viewport = self.context.viewport
-        self._starts = {h.handle_id: (h, h.pose) for h in self._active_handles()}
+    def _begin(self, part: Part, xy: tuple[float, float], *, by_key: bool) -> bool:
+        viewport, mover = self.context.viewport, self.context.mover or self._handles
+        if not mover.begin():
+            return False
+        self._moving = mover
         self._by_key = by_key
         self._typed = ""
         self._has_moved = False
         viewport.gizmo.begin(part, viewport.projection, *xy)
         viewport.begin_motion()
+        return True
 
     def _show(self, delta: NDArray[np.float64]) -> None:
-        """Preview every handle of the drag moved by one world transform about their common pivot."""
+        """Preview what is moved."""
+        assert self._moving is not None
         self._has_moved = True
-        poses = {
-            handle_id: pose.moved(delta, np.asarray(handle.region.center, np.float64))
-            for handle_id, (handle, pose) in self._starts.items()
-        }
-        self.context.session.drag.preview(poses)
+        self._moving.show(delta)
         self.context.hud.show(text=self._read_out())
         self.context.viewport.gizmo_changed()
 
@@ -176,20 +176,17 @@ class TransformTool(Tool):
     def _commit(self) -> None:
         viewport = self.context.viewport
         self.context.session.drag.catch_up()
-        part = viewport.gizmo.dragged
-        assert part is not None
-        label = _LABELS[part.act]
-        if len(self._starts) > 1:
-            label += "s"
+        part, moving = viewport.gizmo.dragged, self._moving
+        assert part is not None and moving is not None
         has_moved = self._has_moved
         viewport.gizmo.end()
         self._finish()
         if has_moved:
-            self.context.session.drag.commit(label)
+            moving.take(part.act)
         viewport.gizmo_changed()
 
     def _finish(self) -> None:
-        self._starts = {}
+        self._moving = None
         self._typed = ""
         self.context.hud.clear()
         self.context.viewport.end_motion()
@@ -233,12 +230,6 @@ class TransformTool(Tool):
         nearest = int(np.argmin(distances))
         is_near = distances[nearest] <= MARKER_REACH_PX * viewport.gizmo.scale
         return marked[nearest] if is_near else None
-
-    def _active_handles(self) -> list[Handle]:
-        scene = self.context.session.scene
-        if scene is None:
-            return []
-        return [h for h in scene.edit.active_handles if h.handle_id in scene.active_handles]
 
     bindings = (
         Binding(

@@ -31,6 +31,7 @@ from splap_editor.ui.actions.edit_actions import EditActions
 from splap_editor.ui.actions.file_actions import FileActions
 from splap_editor.ui.actions.handle_actions import HandleActions
 from splap_editor.ui.actions.menus import fill_menu_bar
+from splap_editor.ui.actions.place_actions import PlaceActions
 from splap_editor.ui.actions.pose_actions import PoseActions
 from splap_editor.ui.actions.program_actions import ProgramActions
 from splap_editor.ui.actions.removal_actions import RemovalActions
@@ -45,6 +46,7 @@ from splap_editor.ui.inspection import Inspection
 from splap_editor.ui.panels.deformer_panel import DeformerPanel
 from splap_editor.ui.panels.display_panel import DisplayPanel
 from splap_editor.ui.panels.handles_panel import HandlesPanel
+from splap_editor.ui.panels.place_panel import PlacePanel
 from splap_editor.ui.panels.scene_panel import ScenePanel
 from splap_editor.ui.panels.section import Section
 from splap_editor.ui.preferences import PreferenceStore
@@ -222,6 +224,7 @@ class MainWindow(FileDrop, QMainWindow):
                 SelectActions(session, through, view.viewport),
                 handles,
                 RemovalActions(session, handles, self.toast),
+                PlaceActions(session),
                 DisplayActions(self.display),
                 self.inspection.graph_actions,
                 self.view_actions,
@@ -262,6 +265,7 @@ class MainWindow(FileDrop, QMainWindow):
     def _add_panels(self) -> None:
         self.handles_panel = HandlesPanel(self.session)
         self.deformer_panel = DeformerPanel(self.session)
+        self.place_panel = PlacePanel(self.session, self.actions_)
         self.display_panel = DisplayPanel(self.display, self.actions_)
         self.scene_panel = ScenePanel(self.session)
         self.scene_panel.reread.connect(self.files.reread)
@@ -272,6 +276,7 @@ class MainWindow(FileDrop, QMainWindow):
         for title, panel in (
             ("Handles", self.handles_panel),
             ("Deformer", self.deformer_panel),
+            ("Place", self.place_panel),
             ("Display", self.display_panel),
             *self.inspection.panels,
             ("Scene", self.scene_panel),

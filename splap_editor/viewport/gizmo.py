@@ -48,6 +48,24 @@ class _Drag:
         return self.frame[:3, 3]
 
 
+@dataclass(frozen=True, eq=False)
+class Claim:
+    """Where the gizmo stands for a tool, and what of it is shown.
+
+    Parameters
+    ----------
+    frame : (4, 4) float64, optional
+        None: it is not shown.
+    acts : set of Act
+    carries_all : bool
+        See `Gizmo`.
+    """
+
+    frame: NDArray[np.float64] | None
+    acts: frozenset[Act] = frozenset(Act)
+    carries_all: bool = False
+
+
 @dataclass(eq=False)
 class Gizmo:
     """Transforms a frame by pointer moves, in device pixels from the top left.

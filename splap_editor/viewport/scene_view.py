@@ -23,6 +23,7 @@ from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.viewport.contribution import Contribution, contribution
 from splap_editor.viewport.depth_order import depth_order
+from splap_editor.viewport.gizmo import Claim
 from splap_editor.viewport.glyphs import Glyphs, base_colors, splat_glyphs
 from splap_editor.viewport.overlays import Mark, MarkShape, circle
 from splap_editor.viewport.projection import Projection
@@ -137,6 +138,7 @@ class SceneView:
         self._marks: tuple[tuple[FileRows, tuple[int, int, int, int]], ...] = ()
         self._view_job = LatestJob(session.view_worker, "view")
         self._is_dragged = False
+        self._claim: Claim | None = None
         self._seen = SeenFrom(np.zeros(3), np.array([0.0, 0.0, -1.0], np.float32), False)
         viewport.splats.view_turned = self._on_view_turned
         session.prepare_for(self)
@@ -222,6 +224,11 @@ class SceneView:
         scene = self._session.shown_scene
         rows = [pin_rows(scene, scene.edit.pin(pin_id)) for pin_id in pin_ids]
         return np.concatenate(rows) if rows else np.empty(0, np.int64)
+
+    def claim_gizmo(self, claim: Claim | None) -> None:
+        """Have the gizmo stand elsewhere; None: at the chosen handles again."""
+        self._claim = claim
+        self._show_handles()
 
     def show_free_ring(self, is_shown: bool) -> None:
         """Draw the free radius about each active handle, facing the viewer."""
@@ -360,8 +367,14 @@ class SceneView:
         viewport.gizmo_changed()
 
     def _place_gizmo(self, scene: Scene, handles: list[Handle]) -> None:
-        if not handles:
-            self.viewport.gizmo.detach()
+        gizmo, claim = self.viewport.gizmo, self._claim
+        shown = claim or Claim(None)
+        gizmo.acts, gizmo.carries_all = shown.acts, shown.carries_all
+        if shown.frame is not None:
+            gizmo.attach(shown.frame)
+            return
+        if claim is not None or not handles:
+            gizmo.detach()
             return
         frame = np.eye(4)
         frame[:3, :3] = quats_to_matrices(np.array([handles[-1].pose.rotate]))[0]

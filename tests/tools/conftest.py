@@ -115,6 +115,7 @@ def hand(stages, no_leaked_vtk, request) -> Iterator[Hand]:
     view = SceneView(session, viewport)
     context = ToolContext(session, viewport, InspectView(session, view))
     context.paint = partial(view.paint, layer="tool")
+    context.claim = view.claim_gizmo
     tools = made_tools(context)
     person = Hand(tools, main)
     session.open(resource("samples", "tube.ply"))

@@ -11,6 +11,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from splap_editor.core.handle_nodes import Region
+from splap_editor.core.place import Place
 from splap_editor.core.pose import Pose
 from splap_editor.engine.keyframes import edit_at_frame, keyed_edit
 from splap_editor.session.pivot import Pivot
@@ -18,6 +19,7 @@ from splap_editor.tools.brush_tool import BrushOptions
 from splap_editor.tools.floaters_tool import FloaterOptions
 from splap_editor.tools.handle_tool import HandleOptions
 from splap_editor.tools.pin_tool import PinOptions
+from splap_editor.tools.tool import PointerEvent
 from splap_editor.tools.tool_table import TOOLS
 from splap_editor.tools.transform_tool import TransformTool
 from splap_editor.ui.actions.action_table import ACTIONS
@@ -82,6 +84,8 @@ def prepared(driver, spec, edit):
     if spec.action_id.startswith("remove.restore"):
         rows = np.arange(n)
         shown = replace(shown, removal=shown.removal.with_rows((rows > 1000) & (rows < 1100)))
+    if spec.action_id == "place.reset":
+        shown = replace(shown, place=Place(translate=(0.1, 0.0, 0.0)))
     scene.set_edit(shown)
     scene.set_active_handles((edit.handles[0].handle_id,))
     scene.set_pivot(Pivot.ACTIVE if spec.action_id == "handle.pivot_median" else Pivot.MEDIAN)
@@ -93,7 +97,7 @@ def prepared(driver, spec, edit):
     window.tools.choose(TOOLS[1 if spec.action_id == f"tool.{TOOLS[0].name}" else 0].name)
     camera.view = replace(camera.home, position=camera.home.position * 1.3 + 0.1)
     if spec.group == "up":
-        camera.world_up = np.array((1.0, 0.0, 0.0))
+        scene.set_up((1.0, 0.0, 0.0))
     if spec.action_id == "edit.redo":
         driver.session.history.undo()
     window.toast.say("")
@@ -209,6 +213,17 @@ def ready_for(driver, name, row, text):
         crop = window_tool(driver, name)
         crop.begin()
         crop.show(crop.shape.sized(crop.shape.center, crop.shape.halves))
+    elif name == "level":
+        # The tools before have flown to a few splats.
+        driver.window.view.viewport.reset_camera()
+        at, ratio = driver.surface_pixel(), driver.window.viewport.devicePixelRatioF()
+        window_tool(driver, name).fit(PointerEvent("press", (at.x() * ratio, at.y() * ratio)))
+    elif name == "measure":
+        measure = window_tool(driver, name)
+        for row in driver.scene.ellipses.rows[[0, -1]]:
+            measure.put(len(measure.rows), int(row))
+        if text in ("Return", "Enter", "Backspace"):
+            driver.key(Qt.Key.Key_5)
     elif name == "floaters":
         finder = window_tool(driver, name)
         finder.ask()

@@ -5,6 +5,7 @@ from splap_editor.ui.actions.edit_table import EDIT_TABLE
 from splap_editor.ui.actions.file_table import FILE_TABLE
 from splap_editor.ui.actions.graph_table import GRAPH_TABLE
 from splap_editor.ui.actions.help_table import HELP_TABLE
+from splap_editor.ui.actions.place_actions import PLACE_TABLE
 from splap_editor.ui.actions.removal_table import REMOVAL_TABLE
 from splap_editor.ui.actions.tool_actions import TOOL_TABLE
 from splap_editor.ui.actions.view_table import VIEW_TABLE
@@ -13,6 +14,7 @@ ACTIONS: tuple[ActionSpec, ...] = (
     *FILE_TABLE,
     *EDIT_TABLE,
     *REMOVAL_TABLE,
+    *PLACE_TABLE,
     *VIEW_TABLE,
     *TOOL_TABLE,
     *GRAPH_TABLE,

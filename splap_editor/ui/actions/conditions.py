@@ -111,6 +111,11 @@ def has_pins(state: State) -> bool:
     return state.scene is not None and bool(state.scene.edit.pins)
 
 
+def is_placed(state: State) -> bool:
+    """The whole object is moved, turned or scaled."""
+    return state.scene is not None and not state.scene.edit.place.is_identity
+
+
 def has_keys(state: State) -> bool:
     """There are keys."""
     return state.scene is not None and bool(state.scene.edit.timeline.keys)

@@ -16,6 +16,7 @@ from splap_editor.ui.actions.conditions import (
     has_scene,
     has_selection,
     has_selection_on_surface,
+    has_surface,
     is_busy,
     is_halted,
 )
@@ -128,6 +129,14 @@ EDIT_TABLE: tuple[ActionSpec, ...] = (
         "&Rim of selection",
         tip="Keep only selected splats with a neighbour that is not.",
         needs=has_selection_on_surface,
+        menu="&Select",
+    ),
+    A(
+        "select.boundary",
+        SelectActions.boundary,
+        "Open &boundary",
+        tip="Keep only splats at an open rim of the surface; without a selection, select all of these.",
+        needs=has_surface,
         menu="&Select",
     ),
     A(

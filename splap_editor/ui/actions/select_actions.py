@@ -6,7 +6,13 @@ import numpy as np
 
 from splap_editor.core.index_spaces import FileMask
 from splap_editor.session.scene import Scene
-from splap_editor.session.selection import connected_selection, grown_selection, rim_selection, shrunk_selection
+from splap_editor.session.selection import (
+    boundary_selection,
+    connected_selection,
+    grown_selection,
+    rim_selection,
+    shrunk_selection,
+)
 from splap_editor.session.session import Session
 from splap_editor.tools.select_tool import SelectOptions
 from splap_editor.tools.tool import Held
@@ -56,6 +62,12 @@ class SelectActions:
         """Keep only those with a neighbour outside."""
         scene = self._scene
         self._select(rim_selection(scene.selection, scene.ellipses, scene.prepared.graph), "Select rim")
+
+    def boundary(self) -> None:
+        """Keep only those at an open rim of the surface; without a selection, take all of these."""
+        scene = self._scene
+        found = boundary_selection(scene.ellipses, scene.prepared.neighborhoods) & ~scene.unseen
+        self._select(found & scene.selection if scene.selection.any() else found, "Select boundary")
 
     def front(self) -> None:
         """Keep only what nothing hides in the view; without a selection, take all of that."""

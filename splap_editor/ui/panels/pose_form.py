@@ -58,7 +58,13 @@ class PoseForm(QWidget):
     changed = Signal(object)
     previewed = Signal(object)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(
+        self,
+        parent: QWidget | None = None,
+        *,
+        words: tuple[str, str, str] = ("Move", "Rotate", "Scale"),
+        scale_range: tuple[float, float] = (0.01, 100.0),
+    ) -> None:
         super().__init__(parent)
         self._pose = Pose()
         self._euler = np.zeros(3)
@@ -70,7 +76,9 @@ class PoseForm(QWidget):
         grid.setVerticalSpacing(STEP)
         self.translate = [NumberField(-1e9, 1e9, decimals=4, step=0.01) for _ in range(3)]
         self.rotate = [NumberField(-360, 360, decimals=2, step=1, unit="°") for _ in range(3)]
-        self.scales = [NumberField(0.01, 100, decimals=3, step=0.01) for _ in range(3)]
+        self.scales = [
+            NumberField(*scale_range, decimals=max(3, round(-np.log10(scale_range[0]))), step=0.01) for _ in range(3)
+        ]
         for axis, (name, color) in enumerate(zip("XYZ", AXIS_COLORS, strict=True)):
             head = PlainLabel(name, styleSheet=f"color: {color};")
             grid.addWidget(head, 0, axis + 1)
@@ -78,7 +86,7 @@ class PoseForm(QWidget):
             grid.addLayout(self._cell(self.translate[axis], color), 1, axis + 1)
             grid.addLayout(self._cell(self.rotate[axis], color), 2, axis + 1)
             grid.addLayout(self._cell(self.scales[axis], color), 3, axis + 1)
-        for row, text in enumerate(("Move", "Rotate", "Scale"), start=1):
+        for row, text in enumerate(words, start=1):
             label = PlainLabel(text)
             label.setProperty("tone", "quiet")
             grid.addWidget(label, row, 0)
