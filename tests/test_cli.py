@@ -14,6 +14,7 @@ from splap_editor.cli import main
 from splap_editor.io.ply import read_ply
 from splap_editor.io.splat_files import read_splats
 from splap_editor.resources import resource
+from splap_editor.stage_report import ShareLine
 
 TUBE = resource("samples", "tube.ply")
 
@@ -264,3 +265,14 @@ def test_deform_writes_what_the_ending_names(tmp_path, recipe, capsys):
     summary = json.loads(capsys.readouterr().out)
     assert any("rounded" in loss for loss in summary["losses"])
     assert read_splats(out).splats.n_splats == summary["n_splats"]
+
+
+@pytest.mark.parametrize("is_live", [True, False])
+def test_compiling_is_one_line_on_the_terminal(is_live, capsys, monkeypatch):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: is_live, raising=False)
+    tell = ShareLine("compiling for this computer, once")
+    for share in (0.0, 0.004, 0.3, 0.3, 0.9, 1.0):
+        tell(share)
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1 and told.endswith("\n") and told.startswith(("\rcompiling", "compiling"))
+    assert ("100 %" in told) == is_live

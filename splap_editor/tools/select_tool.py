@@ -33,7 +33,9 @@ class SelectOptions:
         Also splats behind others.
     """
 
-    through: bool = option(False, "Also select what lies behind; otherwise only what is visible.", label="Through")
+    through: bool = option(
+        False, "Also select what lies behind; otherwise only what is visible.", label="Select through"
+    )
 
 
 class DrawnStroke:

@@ -50,6 +50,7 @@ from splap_editor.ui.panels.place_panel import PlacePanel
 from splap_editor.ui.panels.scene_panel import ScenePanel
 from splap_editor.ui.panels.section import Section
 from splap_editor.ui.preferences import PreferenceStore
+from splap_editor.ui.theme import show_more_button
 from splap_editor.ui.timeline.strip import TimelineStrip
 from splap_editor.ui.viewport_widget import ViewportWidget
 from splap_editor.ui.widgets.job_bar import JobBar
@@ -82,6 +83,9 @@ CONTEXT_MENU = (
 )
 LAYOUT_VERSION = 1
 UPS = {(0.0, 0.0, 1.0): "view.up_z", (0.0, 1.0, 0.0): "view.up_y", (0.0, -1.0, 0.0): "view.down_y"}
+
+GUESSED_UP = (0.0, -1.0, 0.0)
+"""What structure from motion mostly makes of up: true of most captures, and no more."""
 
 
 class MainWindow(FileDrop, QMainWindow):
@@ -249,6 +253,7 @@ class MainWindow(FileDrop, QMainWindow):
         for action_id in ("file.open", "file.export", "help.sheet"):
             column.addAction(self.actions_[action_id])
         self.addToolBar(Qt.ToolBarArea.LeftToolBarArea, column)
+        show_more_button(column)
 
     def _add_centre(self) -> None:
         centre = QWidget()
@@ -285,8 +290,9 @@ class MainWindow(FileDrop, QMainWindow):
         stack.addStretch(1)
         scroll = QScrollArea(widgetResizable=True)
         scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        scroll.setMinimumWidth(272)
         scroll.setWidget(page)
+        # Nothing of a panel is cut off at the side.
+        scroll.setMinimumWidth(page.minimumSizeHint().width() + scroll.verticalScrollBar().sizeHint().width())
         self.dock.setTitleBarWidget(QWidget())
         self.dock.setFeatures(QDockWidget.DockWidgetFeature.NoDockWidgetFeatures)
         self.dock.setWidget(scroll)
@@ -332,7 +338,16 @@ class MainWindow(FileDrop, QMainWindow):
         self.actions_.check("remove.show", False)
         self.display.apply(self.view)
         self._show_first_steps()
+        self._tell_up()
         self._refresh()
+
+    def _tell_up(self) -> None:
+        """Say once, ever, that which way is up was guessed, and where that is put right."""
+        scene, settings = self.session.shown_scene, QSettings()
+        is_guess = self.view.preferred_up is None and scene.up == GUESSED_UP and scene.edit.place.is_identity
+        if is_guess and not settings.value("up/told", False, type=bool):
+            settings.setValue("up/told", True)
+            self.toast.say("Such a file does not say which way is up. If it lies on its side: View ▸ Up.")
 
     def _on_state_changed(self) -> None:
         if self.session.state == "opening":

@@ -5,7 +5,7 @@ from functools import cache
 from PySide6.QtCore import QByteArray, QRectF, Qt
 from PySide6.QtGui import QColor, QGuiApplication, QIcon, QImage, QPainter, QPalette, QPixmap
 from PySide6.QtSvg import QSvgRenderer
-from PySide6.QtWidgets import QApplication, QStyleFactory
+from PySide6.QtWidgets import QApplication, QStyleFactory, QToolBar, QToolButton
 
 from splap_editor.resources import resource
 
@@ -146,6 +146,8 @@ def _bars() -> str:
     #toolColumn QToolButton {{ padding: 6px; }}
     #headerBar {{ background: {PANEL}; }}
     #headerBar QToolButton {{ padding: 4px 8px; }}
+    #headerButtons {{ padding: 0; spacing: 2px; }}
+    #headerButtons #qt_toolbar_ext_button, #toolColumn #qt_toolbar_ext_button {{ padding: 0; background: {RAISED}; }}
     """
 
 
@@ -239,3 +241,11 @@ def _own() -> str:
     #toast[tone="failure"] {{ border-color: {DANGER}; }}
     #keyCap {{ background: {FIELD}; border: 1px solid {LINE}; border-radius: 3px; padding: 1px 6px; color: {TEXT}; }}
     """
+
+
+def show_more_button(bar: QToolBar) -> None:
+    """Have the button for what a tool bar has no room for look like the others; Qt's own is dark on dark."""
+    more = bar.findChild(QToolButton, "qt_toolbar_ext_button")
+    assert isinstance(more, QToolButton)
+    more.setIcon(icon("chevron-down" if bar.orientation() == Qt.Orientation.Vertical else "chevron-right"))
+    more.setToolTip("More")

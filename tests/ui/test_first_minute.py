@@ -1,6 +1,7 @@
 """What a new user does in the first minute, with a real mouse and real keys."""
 
 import numpy as np
+import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QApplication
 
@@ -8,6 +9,7 @@ from splap_editor.io.ply import read_ply
 from splap_editor.ui.dialogs.export_dialog import ExportDialog
 from splap_editor.ui.main_window import HINT
 from splap_editor.viewport.gizmo_parts import ARROWS
+from tests.reference.ply import ply_bytes, splat_columns
 
 
 def arrow_pixel(driver, axis: int) -> QPoint:
@@ -87,6 +89,50 @@ def test_grab_by_key_takes_an_axis_and_a_typed_number(driver, qtbot):
     driver.wait_idle()
     np.testing.assert_allclose(driver.scene.edit.handles[0].pose.translate, (0.2, 0.0, 0.0), atol=1e-12)
     assert driver.window.display.options.mode != "splats" or driver.window.actions_["display.splats"].isChecked()
+
+
+def test_two_turns_by_keys_are_shown_as_they_were_entered(driver):
+    driver.click(driver.surface_pixel())
+    driver.wait_idle()
+    key = Qt.Key
+    for turn in ((key.Key_R, key.Key_Y, key.Key_1, key.Key_2, key.Key_0), (key.Key_R, key.Key_Z, key.Key_4, key.Key_0)):
+        for each in (*turn, key.Key_Return):
+            driver.key(each)
+        driver.wait_idle()
+    shown = [field.value() for field in driver.window.handles_panel.pose_form.rotate]
+    np.testing.assert_allclose(shown, (0.0, 120.0, 40.0), atol=1e-9)
+
+
+def test_that_up_is_a_guess_is_said_once(driver, tmp_path):
+    """Of a file of three scales; one of two says by its making that Z is up."""
+    window, told = driver.window, []
+    assert "which way is up" not in window.toast.text
+    path = tmp_path / "capture.ply"
+    path.write_bytes(ply_bytes(splat_columns(300, np.random.default_rng(0))))
+    for _ in range(2):
+        window.toast.hide()
+        driver.open(path)
+        driver.wait_idle()
+        told.append(window.toast.text)
+    assert "View ▸ Up" in told[0] and told[1] == ""
+    window.actions_["view.up_z"].trigger()
+    assert driver.scene.up == (0.0, 0.0, 1.0)
+
+
+@pytest.mark.parametrize("up", ["view.up_z", "view.up_y", "view.down_y"])
+@pytest.mark.parametrize("side", ["front", "back", "right", "left", "top", "bottom"])
+def test_the_sides_of_a_scene_follow_what_is_up(driver, up, side):
+    actions, camera = driver.window.actions_, driver.window.view.viewport.camera
+    actions[up].trigger()
+    actions[f"view.{side}"].trigger()
+    flight = driver.window.view_actions._flight
+    driver.qtbot.waitUntil(lambda: flight.state() == flight.State.Stopped)
+    up_axis = {"view.up_z": (0, 0, 1), "view.up_y": (0, 1, 0), "view.down_y": (0, -1, 0)}[up]
+    forward = np.array(camera.view.focal_point) - np.array(camera.view.position)
+    along = float(forward @ np.array(up_axis)) / float(np.linalg.norm(forward))
+    np.testing.assert_allclose(along, {"top": -1.0, "bottom": 1.0}.get(side, 0.0), atol=1e-3)
+    if side not in ("top", "bottom"):
+        np.testing.assert_allclose(camera.up, up_axis, atol=1e-3)
 
 
 def test_left_drag_on_empty_space_orbits(driver):

@@ -3,6 +3,7 @@
 from PySide6.QtCore import Qt
 
 from splap_editor.tools.crop_tool import CropNumbers, CropOptions
+from splap_editor.tools.select_tool import SelectOptions
 from splap_editor.ui.widgets.tool_options import ToolOptionsBar
 
 
@@ -32,3 +33,14 @@ def test_a_crop_from_the_keyboard_is_undone(driver):
     driver.session.history.undo()
     assert driver.scene.edit.removed is None
     driver.wait_idle()
+
+
+def test_selecting_through_goes_by_one_name_and_is_one_switch(driver):
+    (bar,) = driver.window.findChildren(ToolOptionsBar)
+    switch, action = bar.forms[SelectOptions].editors["through"], driver.window.actions_["select.through"]
+    for _ in range(2):
+        action.trigger()
+        assert switch.isChecked() == action.isChecked()
+        assert switch.text() == action.text().replace("&", "")
+    switch.click()
+    assert action.isChecked() and switch.text() == action.text().replace("&", "")

@@ -4,18 +4,25 @@ from dataclasses import replace
 from typing import Any
 
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QToolButton, QWidget
+from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QSizePolicy, QToolBar, QToolButton, QWidget
 
 from splap_editor.tools.tool import Held
 from splap_editor.tools.tool_manager import ToolManager
 from splap_editor.tools.tool_table import TOOLS
 from splap_editor.ui.actions.actions import ActionSet
-from splap_editor.ui.theme import STEP
+from splap_editor.ui.theme import STEP, show_more_button
 from splap_editor.ui.widgets.choices import Choice
 from splap_editor.ui.widgets.number_field import NumberField, ScrubLabel
 from splap_editor.ui.widgets.options_form import FieldHint, hints_of
 from splap_editor.ui.widgets.plain_text import PlainLabel
 
+BUTTONS = (
+    ("view.panels",),
+    ("edit.undo", "edit.redo"),
+    ("display.ellipses", "display.splats", "display.points"),
+    ("handle.local", "view.orthographic", "view.frame_selection"),
+)
+"""Those at the end are the first to make room."""
 TITLES = {entry.name: entry.title for entry in TOOLS}
 
 
@@ -45,18 +52,7 @@ class ToolOptionsBar(QWidget):
         for form in self.forms.values():
             layout.addWidget(form)
         layout.addStretch(1)
-        for group in (
-            ("edit.undo", "edit.redo"),
-            ("display.ellipses", "display.splats", "display.points"),
-            ("handle.local", "view.orthographic", "view.frame_selection"),
-            ("view.panels",),
-        ):
-            layout.addSpacing(STEP)
-            strip = QHBoxLayout()
-            strip.setSpacing(2)
-            for action_id in group:
-                strip.addWidget(_icon_button(actions, action_id))
-            layout.addLayout(strip)
+        layout.addWidget(_strip(actions))
         tools.chosen_changed.connect(self._show)
         self._show()
 
@@ -125,10 +121,18 @@ class HeldForm(QWidget):
                 editor.show_value(self._hints[name].factor * value)
 
 
-def _icon_button(actions: ActionSet, action_id: str) -> QToolButton:
-    button = QToolButton(autoRaise=True)
-    button.setDefaultAction(actions[action_id])
-    button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonIconOnly)
-    button.setIconSize(QSize(18, 18))
-    button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-    return button
+def _strip(actions: ActionSet) -> QToolBar:
+    """The buttons; those that a narrow window has no room for stand in the menu of its last one."""
+    strip = QToolBar()
+    strip.setObjectName("headerButtons")
+    strip.setIconSize(QSize(18, 18))
+    for k, group in enumerate(BUTTONS):
+        if k:
+            strip.addSeparator()
+        strip.addActions([actions[action_id] for action_id in group])
+    # What is wider than a button each does not grow; what is narrower puts buttons away.
+    strip.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
+    for button in strip.findChildren(QToolButton):
+        button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+    show_more_button(strip)
+    return strip
