@@ -24,8 +24,6 @@ _COLOR, _LIT = (0.95, 0.95, 0.98), (1.0, 0.8, 0.3)
 _STUB = 0.12
 """Length of a handle, as a share of the mean half side."""
 
-CENTER = -1
-
 
 @dataclass(frozen=True)
 class CropOptions:
@@ -67,27 +65,20 @@ class CropNumbers:
 
 
 class CropStroke:
-    """Drags one handle along its normal, or the whole by its middle across the view; from the state at the press."""
+    """Drags one handle along its normal, from the state at the press."""
 
     def __init__(self, tool: "CropTool", press: PointerEvent, handle: int, shape: CropShape) -> None:
         self.tool, self.handle, self.before = tool, handle, shape
         self.projection = tool.context.viewport.projection
         self.from_ = self._along(press)
 
-    def _along(self, event: PointerEvent) -> NDArray[np.float64]:
-        shape = self.before
-        if self.handle == CENTER:
-            return self.projection.on_plane(*event.xy, shape.center, self.projection.direction)
-        at, normal = shape.handles[self.handle], shape.normals[self.handle]
-        return np.array(self.projection.on_line(*event.xy, at, normal))
+    def _along(self, event: PointerEvent) -> float:
+        at, normal = self.before.handles[self.handle], self.before.normals[self.handle]
+        return self.projection.on_line(*event.xy, at, normal)
 
     def move(self, event: PointerEvent) -> None:
         """Follow the pointer."""
-        along = self._along(event) - self.from_
-        if self.handle == CENTER:
-            self.tool.show(self.before.moved(along))
-        else:
-            self.tool.show(self.before.pulled(self.handle, float(along)))
+        self.tool.show(self.before.pulled(self.handle, self._along(event) - self.from_))
 
     def end(self, event: PointerEvent) -> None:
         """Leave it there; what goes is taken by Return."""
@@ -253,13 +244,13 @@ class CropTool(Tool):
         if shape is None:
             return None
         tips = self._stubs(shape)[:, 1]
-        places = np.concatenate([tips, shape.handles, shape.center[None]])
+        places = np.concatenate([tips, shape.handles])
         distances = np.linalg.norm(viewport.projection.pixels(places) - np.array(xy), axis=1)
         distances = np.nan_to_num(distances, nan=np.inf)
         nearest = int(np.argmin(distances))
         if distances[nearest] > GRAB_PX * viewport.gizmo.scale:
             return None
-        return CENTER if nearest == len(places) - 1 else nearest % len(tips)
+        return nearest % len(tips)
 
     # Options ------------------------------------------------------------------------------------------------------
 
@@ -313,10 +304,8 @@ class CropTool(Tool):
         if shape is None:
             return
         stubs = list(self._stubs(shape))
-        arm = _STUB * float(shape.halves.mean())
-        cross = [shape.center + arm * np.array([-axis, axis]) for axis in shape.axes]
-        rings.show("crop handles", [*stubs, *cross], _COLOR, width_px=6.0, is_closed=False)
-        lit = [] if self._lit is None else cross if self._lit == CENTER else [stubs[self._lit]]
+        rings.show("crop handles", stubs, _COLOR, width_px=6.0, is_closed=False)
+        lit = [] if self._lit is None else [stubs[self._lit]]
         rings.show("crop lit", lit, _LIT, width_px=7.0, is_closed=False)
         self.context.viewport.request_render()
 
@@ -327,7 +316,7 @@ class CropTool(Tool):
         return np.stack([shape.handles, shape.handles + arm * shape.normals], axis=1)
 
     bindings = (
-        Binding(("Drag",), pull, "A handle of the crop: its face; its middle: the whole", "drag a face", at_once=True),
+        Binding(("Drag",), pull, "A handle of the crop: its face", "drag a face", at_once=True),
         Binding(("Click",), wake, "Show the shape again"),
         Binding(("[", "]"), turn, "Turn the shape about the line of sight", "turn"),
         Binding(("Return", "Enter"), take, "Remove what is tinted", "take it"),

@@ -18,6 +18,7 @@ from splap_editor.session.documents import Documents
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.tools.handle_tool import HandleTool
+from splap_editor.tools.place_tool import PlaceTool
 from splap_editor.tools.select_tool import SelectOptions
 from splap_editor.tools.tool import ToolContext
 from splap_editor.tools.tool_manager import ToolManager
@@ -48,7 +49,7 @@ from splap_editor.ui.panels.display_panel import DisplayPanel
 from splap_editor.ui.panels.handles_panel import HandlesPanel
 from splap_editor.ui.panels.place_panel import PlacePanel
 from splap_editor.ui.panels.scene_panel import ScenePanel
-from splap_editor.ui.panels.section import Section
+from splap_editor.ui.panels.section import Section, bring_into_view
 from splap_editor.ui.preferences import PreferenceStore
 from splap_editor.ui.theme import show_more_button
 from splap_editor.ui.timeline.strip import TimelineStrip
@@ -315,6 +316,8 @@ class MainWindow(FileDrop, QMainWindow):
 
     def _show_tool(self) -> None:
         self.actions_.check(f"tool.{self.tools.chosen.name}")
+        if self.tools.chosen.name == PlaceTool.name:
+            bring_into_view(self.place_panel)
 
     def _show_display(self) -> None:
         options = self.display.options
