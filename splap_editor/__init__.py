@@ -20,9 +20,7 @@ __all__ = [
     "options",
     "prepare",
     "read_ply",
-    "read_recipe",
     "write_ply",
-    "write_recipe",
 ]
 
 TYPE_CHECKING = False
@@ -33,8 +31,10 @@ if TYPE_CHECKING:
     from splap_editor.engine.scripting import deform, prepare
     from splap_editor.io.plain_edit import Edit, Handle, Pin
     from splap_editor.io.ply import read_ply, write_ply
-    from splap_editor.io.recipe import read_recipe, write_recipe
+    from splap_editor.io.recipe import read_recipe as read_recipe
+    from splap_editor.io.recipe import write_recipe as write_recipe
 
+# A script that keeps its edits finds the recipe's functions here too.
 _PLACES = {
     "Edit": "io.plain_edit",
     "Handle": "io.plain_edit",
@@ -52,7 +52,7 @@ _PLACES = {
 
 
 def __getattr__(name: str) -> object:
-    """Import one of `__all__` when it is first used."""
+    """Import a name when it is first used."""
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module

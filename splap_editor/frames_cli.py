@@ -2,7 +2,7 @@
 
 import argparse
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,7 +11,7 @@ from splap_editor.io.png import write_png
 from splap_editor.io.recipe import read_recipe
 from splap_editor.io.session_file import content_hash, read_session_file
 from splap_editor.io.session_specs import SessionFile
-from splap_editor.io.video import is_video, write_video
+from splap_editor.io.video import is_video
 from splap_editor.stage_report import StageReport
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def deform_frames(options: argparse.Namespace) -> int:
 def render(options: argparse.Namespace) -> int:
     """Draw a picture, one for each frame, or one for each step of a turntable."""
     from splap_editor.engine.frames import drawn_frames, frame_range, write_pictures
-    from splap_editor.viewport.studio import turntable_views
+    from splap_editor.viewport.studio import drawn_round
 
     if options.turntable is not None and not 1 <= options.turntable <= LARGEST_TURNTABLE:
         raise ValueError(f"--turntable must be 1 to {LARGEST_TURNTABLE} pictures, got {options.turntable}")
@@ -100,24 +100,25 @@ def render(options: argparse.Namespace) -> int:
         studio, view = _studio(options, held, file, poser.edit)
     try:
 
+        def draw_view(seen: "View") -> "NDArray[np.uint8]":
+            return studio.picture(seen, is_transparent=options.transparent)
+
         def draw(kernels: "AdaptedKernels | None") -> "NDArray[np.uint8]":
             studio.pose(kernels)
-            return studio.picture(view, is_transparent=options.transparent)
+            return draw_view(view)
 
         with report("pictures"):
-            if frames is not None and makes_video:
-                write_video(output, drawn_frames(poser, frames, draw, progress=report.progress), rate)
-                written = [output]
-            elif frames is not None:
-                written = write_pictures(poser, frames, output, draw, write_png, progress=report.progress)
+            if frames is not None:
+                pictures = drawn_frames(poser, frames, draw, progress=report.progress)
+                written = write_pictures(output, pictures, frames, rate)
             elif options.turntable is None:
                 write_png(output, draw(poser.kernels(None)))
                 written = [output]
             else:
                 studio.pose(poser.kernels(None))
-                views = turntable_views(view, options.turntable, studio.viewport.camera.up)
-                pictures = _drawn_round(studio, views, options.transparent, report)
-                written = _written_round(pictures, output, len(views), rate)
+                n, up = options.turntable, studio.viewport.camera.up
+                pictures = drawn_round(view, n, up, draw_view, progress=report.progress)
+                written = write_pictures(output, pictures, range(1, n + 1), rate)
     finally:
         studio.close()
     _tell(options, report, written)
@@ -184,27 +185,6 @@ def _rate(options: argparse.Namespace, timeline: "Timeline | None") -> float:
     if not 0 < options.fps <= 1000:
         raise ValueError(f"--fps must be above 0 and up to 1000, got {options.fps:g}")
     return float(options.fps)
-
-
-def _drawn_round(
-    studio: "Studio", views: "list[View]", is_transparent: bool, report: StageReport
-) -> "Iterator[NDArray[np.uint8]]":
-    for number, view in enumerate(views, start=1):
-        yield studio.picture(view, is_transparent=is_transparent)
-        report.progress(number / len(views))
-
-
-def _written_round(pictures: "Iterator[NDArray[np.uint8]]", output: Path, n: int, rate: float) -> list[Path]:
-    """Write the pictures of a turntable, as a video or one file each."""
-    from splap_editor.engine.frames import frame_path
-
-    if is_video(output):
-        write_video(output, pictures, rate)
-        return [output]
-    written = [frame_path(output, number, n) for number in range(1, n + 1)]
-    for path, picture in zip(written, pictures, strict=True):
-        write_png(path, picture)
-    return written
 
 
 def _tell(options: argparse.Namespace, report: StageReport, written: list[Path]) -> None:

@@ -20,7 +20,9 @@ from splap_editor.engine.scripting import write_posed
 from splap_editor.engine.skin import write_skin
 from splap_editor.engine.surface import Surface
 from splap_editor.io.formats.table import format_named, format_to_write
+from splap_editor.io.png import write_png
 from splap_editor.io.splat_files import SplatFile, write_animation
+from splap_editor.io.video import is_video, write_video
 
 Pixels = TypeVar("Pixels")
 
@@ -163,36 +165,45 @@ def drawn_frames(
     *,
     progress: Progress = no_progress,
 ) -> Iterator[Pixels]:
-    """Draw each frame, one at a time; parameters as of `write_pictures`."""
+    """Draw each frame, one at a time.
+
+    Parameters
+    ----------
+    poser, frames, progress
+        As of `write_frames`.
+    draw : callable
+        Makes pixels of kernels.
+    """
     for done, kernels in _posed(poser, frames, progress):
         yield draw(kernels)
         progress((done + 1) / len(frames))
 
 
-def write_pictures(
-    poser: FramePoser,
-    frames: range,
-    path: Path,
-    draw: Callable[[AdaptedKernels | None], Pixels],
-    write: Callable[[Path, Pixels], None],
-    *,
-    progress: Progress = no_progress,
-) -> list[Path]:
-    """Draw and write a picture for each frame.
+def write_pictures(path: Path, pictures: Iterator[NDArray[np.uint8]], numbers: range, fps: float) -> list[Path]:
+    """Write a series of pictures: a video where the path ends like one, otherwise a PNG each.
 
     Parameters
     ----------
-    poser, frames, path, progress
-        As of `write_frames`.
-    draw : callable
-        Makes pixels of kernels.
-    write : callable
-        ``write(path, pixels)``.
+    path : Path
+        ``frame_path`` makes the names of pictures of it.
+    pictures : iterator of (H, W, 3 or 4) uint8
+        Each is written before the next is asked for.
+    numbers : range
+        A picture's number each.
+    fps : float
+        Pictures per second of a video.
+
+    Returns
+    -------
+    list of Path
     """
+    if is_video(path):
+        write_video(path, pictures, fps)
+        return [path]
     written = []
-    for frame, picture in zip(frames, drawn_frames(poser, frames, draw, progress=progress), strict=True):
-        written.append(frame_path(path, frame, frames[-1]))
-        write(written[-1], picture)
+    for number, picture in zip(numbers, pictures, strict=True):
+        written.append(frame_path(path, number, numbers[-1]))
+        write_png(written[-1], picture)
     return written
 
 

@@ -1,5 +1,6 @@
 """The disc of surface under the pointer, that a click makes a handle or a pin."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -37,7 +38,7 @@ class DiscOptions:
     )
 
 
-class DiscTool(Tool):
+class DiscTool(Tool, ABC):
     """Lights up the disc that a click takes; a drag, wherever it starts, moves the camera."""
 
     def __init__(self, context: ToolContext) -> None:
@@ -74,9 +75,9 @@ class DiscTool(Tool):
             self.left()
             self.take(region, held_pose(scene, region))
 
+    @abstractmethod
     def take(self, region: Region, pose: Pose) -> None:
         """Make something of a region, whose splats have been moved by a pose."""
-        raise NotImplementedError
 
     def resize(self, event: PointerEvent | KeyEvent) -> None:
         """Change the reach by a wheel notch or a key."""

@@ -1,5 +1,6 @@
 """What the selection tools have in common: a click, the modifiers, one step of the history."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -38,7 +39,7 @@ class SelectOptions:
     )
 
 
-class DrawnStroke:
+class DrawnStroke(ABC):
     """A region drawn on the screen; the release selects what is in it."""
 
     def __init__(self, tool: "SelectTool", press: PointerEvent, mode: SelectionMode) -> None:
@@ -48,13 +49,13 @@ class DrawnStroke:
         self.before = self.context.session.shown_scene.selection
         self.path = [press.xy]
 
+    @abstractmethod
     def move(self, event: PointerEvent) -> None:
         """Draw on."""
-        raise NotImplementedError
 
+    @abstractmethod
     def inside(self, screen: NDArray[np.float32]) -> FileMask:
         """(N,) which `screen_points` are in the region."""
-        raise NotImplementedError
 
     def end(self, event: PointerEvent) -> None:
         """Select."""

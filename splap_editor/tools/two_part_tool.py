@@ -1,5 +1,6 @@
 """Pointing at two parts by a stroke or a click each: what separating and joining have in common."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any, ClassVar
 
@@ -44,7 +45,7 @@ class PartStroke:
         self.tool.context.hud.clear()
 
 
-class TwoPartTool(Tool):
+class TwoPartTool(Tool, ABC):
     """Two parts are pointed at; what would be done to them is found in the background and shown.
 
     `found` has the `stroke` it was found for; it is None while that is looked for.
@@ -63,17 +64,17 @@ class TwoPartTool(Tool):
         # What was found in another graph, or is drawn where splats no longer are, would mislead.
         SceneFollower(context.session, self.drop, surface_changed=self.ask, pose_changed=self._draw)
 
+    @abstractmethod
     def wanted(self) -> Separation | Joint:
         """The stroke that both parts make."""
-        raise NotImplementedError
 
+    @abstractmethod
     def finder(self) -> Callable[[Surface, Any], Any]:
         """Find, on the worker, what a stroke does to a surface."""
-        raise NotImplementedError
 
+    @abstractmethod
     def shown(self, found: Any, positions: np.ndarray) -> tuple[list[np.ndarray], str]:
         """Lines to draw over the splats at their positions (N, 3) for what was found, and what to say of it."""
-        raise NotImplementedError
 
     # Pointing -----------------------------------------------------------------------------------------------------
 

@@ -1,11 +1,14 @@
 """Pictures of a scene without a window on the screen: frames of an animation, and views all round."""
 
+from collections.abc import Callable, Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 from vtkmodules.vtkRenderingCore import vtkRenderWindow
 
 from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
 from splap_editor.core.index_spaces import FileMask
+from splap_editor.core.progress import Progress, no_progress
 from splap_editor.core.splats.main_subject import main_subject
 from splap_editor.core.splats.spherical_harmonics import view_colors
 from splap_editor.core.splats.splats import Splats
@@ -99,6 +102,15 @@ class Studio:
         self.viewport.splats.set_colors(rgba_bytes(rgb, splats.opacities))
 
 
-def turntable_views(view: View, n: int, up: NDArray[np.float64]) -> list[View]:
-    """``n`` views once round the focal point at equal angles, the first the given one; the scene turns to the right."""
-    return [orbited(view, 2.0 * np.pi * i / n, 0.0, up) for i in range(n)]
+def drawn_round(
+    view: View,
+    n: int,
+    up: NDArray[np.float64],
+    draw: Callable[[View], NDArray[np.uint8]],
+    *,
+    progress: Progress = no_progress,
+) -> Iterator[NDArray[np.uint8]]:
+    """Draw ``n`` views once round the focal point at equal angles, the first the given one; the scene turns right."""
+    for done in range(n):
+        yield draw(orbited(view, 2.0 * np.pi * done / n, 0.0, up))
+        progress((done + 1) / n)

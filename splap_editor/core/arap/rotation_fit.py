@@ -118,20 +118,7 @@ def rotation_quaternion(a00, a01, a02, a10, a11, a12, a20, a21, a22):
         - n03 * (n01 * r - n11 * t + n12 * u)
     )
     c1 = -8.0 * (xx * (yy * zz - yz * zy) - xy * (yx * zz - yz * zx) + xz * (yx * zy - yy * zx))
-    # With det(A) = 0 the quartic is biquadratic, so this start is the root itself on flat neighbourhoods.
-    top = min(1.7320508075688774, math.sqrt(1.0 + math.sqrt(max(0.0, 1.0 - c0))) + 0.5 * abs(c1))
-    for _ in range(50):
-        square = top * top
-        value = ((square - 2.0) * top + c1) * top + c0
-        slope = 4.0 * (square - 1.0) * top + c1
-        divisor = 2.0 * slope * slope - value * (12.0 * square - 4.0)
-        if divisor <= 0.0:
-            break
-        step = 2.0 * value * slope / divisor
-        top -= step
-        # Convergence is cubic: what is left after this step is below rounding.
-        if abs(step) < 1e-7:
-            break
+    top = _largest_root(c0, c1)
     m00, m11, m22, m33 = n00 - top, n11 - top, n22 - top, n33 - top
     # Every column of the adjugate of N - top I is a multiple of the eigenvector: take the longest.
     p, q, r = m22 * m33 - n23 * n23, n12 * m33 - n13 * n23, n12 * n23 - n13 * m22
@@ -151,6 +138,16 @@ def rotation_quaternion(a00, a01, a02, a10, a11, a12, a20, a21, a22):
     d22 = v * m33 - m00 * n13 * n13 - m11 * n03 * n03 + 2.0 * n01 * n03 * n13
     d23 = -(v * n23 - m00 * n12 * n13 - m11 * n02 * n03 + n01 * (n02 * n13 + n03 * n12))
     d33 = v * m22 - m00 * n12 * n12 - m11 * n02 * n02 + 2.0 * n01 * n02 * n12
+    best, w, x, y, z = _longest_column(d00, d01, d02, d03, d11, d12, d13, d22, d23, d33)
+    if best < _NEARLY_DOUBLE:
+        return _top_eigenvector(n00, n01, n02, n03, n11, n12, n13, n22, n23, n33)
+    length = 1.0 / math.sqrt(w * w + x * x + y * y + z * z)
+    return w * length, x * length, y * length, z * length
+
+
+@nb.njit(nogil=True, cache=True)
+def _longest_column(d00, d01, d02, d03, d11, d12, d13, d22, d23, d33):
+    """Size of the largest diagonal entry of a symmetric 4 × 4 matrix of rank 1, and the column that it stands in."""
     w, x, y, z = d00, d01, d02, d03
     best = abs(d00)
     if abs(d11) > best:
@@ -162,10 +159,27 @@ def rotation_quaternion(a00, a01, a02, a10, a11, a12, a20, a21, a22):
     if abs(d33) > best:
         best = abs(d33)
         w, x, y, z = d03, d13, d23, d33
-    if best < _NEARLY_DOUBLE:
-        return _top_eigenvector(n00, n01, n02, n03, n11, n12, n13, n22, n23, n33)
-    length = 1.0 / math.sqrt(w * w + x * x + y * y + z * z)
-    return w * length, x * length, y * length, z * length
+    return best, w, x, y, z
+
+
+@nb.njit(nogil=True, cache=True, fastmath={"contract", "reassoc", "arcp", "nsz"})
+def _largest_root(c0, c1):
+    """Largest root of ``t⁴ - 2 t² + c1 t + c0``, whose roots are all real, by Halley's method from above."""
+    # With det(A) = 0 the quartic is biquadratic, so this start is the root itself on flat neighbourhoods.
+    top = min(1.7320508075688774, math.sqrt(1.0 + math.sqrt(max(0.0, 1.0 - c0))) + 0.5 * abs(c1))
+    for _ in range(50):
+        square = top * top
+        value = ((square - 2.0) * top + c1) * top + c0
+        slope = 4.0 * (square - 1.0) * top + c1
+        divisor = 2.0 * slope * slope - value * (12.0 * square - 4.0)
+        if divisor <= 0.0:
+            break
+        step = 2.0 * value * slope / divisor
+        top -= step
+        # Convergence is cubic: what is left after this step is below rounding.
+        if abs(step) < 1e-7:
+            break
+    return top
 
 
 @nb.njit(nogil=True, cache=True)

@@ -29,6 +29,17 @@ from splap_editor.ui.actions.selection_sets_menu import SelectionSetsMenu
 
 A = ActionSpec
 
+PIVOTS = (
+    ("median", Pivot.MEDIAN, "&Middle of the chosen", "Several handles turn and scale about the point between them."),
+    ("active", Pivot.ACTIVE, "&Active handle", "Several handles turn and scale about the one chosen last."),
+    (
+        "point",
+        Pivot.POINT,
+        "&Placed point",
+        "Handles turn and scale about a point; Shift + right click on the surface places it.",
+    ),
+)
+
 EDIT_TABLE: tuple[ActionSpec, ...] = (
     A(
         "edit.undo",
@@ -283,29 +294,16 @@ EDIT_TABLE: tuple[ActionSpec, ...] = (
         needs=has_active_handles,
         menu="Ha&ndle",
     ),
-    A(
-        "pose.mirror_x",
-        PoseActions.mirror_x,
-        "Across &X",
-        tip="Pose the handle opposite in X.",
-        needs=has_active_handles,
-        menu="Ha&ndle/&Mirror",
-    ),
-    A(
-        "pose.mirror_y",
-        PoseActions.mirror_y,
-        "Across &Y",
-        tip="Pose the handle opposite in Y.",
-        needs=has_active_handles,
-        menu="Ha&ndle/&Mirror",
-    ),
-    A(
-        "pose.mirror_z",
-        PoseActions.mirror_z,
-        "Across &Z",
-        tip="Pose the handle opposite in Z.",
-        needs=has_active_handles,
-        menu="Ha&ndle/&Mirror",
+    *(
+        A(
+            f"pose.mirror_{axis}",
+            partial(PoseActions.mirror_across, axis="xyz".index(axis)),
+            f"Across &{axis.upper()}",
+            tip=f"Pose the handle opposite in {axis.upper()}.",
+            needs=has_active_handles,
+            menu="Ha&ndle/&Mirror",
+        )
+        for axis in "xyz"
     ),
     A(
         "pose.mirror_symmetry",
@@ -316,35 +314,18 @@ EDIT_TABLE: tuple[ActionSpec, ...] = (
         needs=has_active_handles,
         menu="Ha&ndle/&Mirror",
     ),
-    A(
-        "handle.pivot_median",
-        partial(HandleActions.pivot, pivot=Pivot.MEDIAN),
-        "&Middle of the chosen",
-        tip="Several handles turn and scale about the point between them.",
-        needs=has_scene,
-        menu="Ha&ndle/Pi&vot",
-        group="pivot",
-        checkable=True,
-    ),
-    A(
-        "handle.pivot_active",
-        partial(HandleActions.pivot, pivot=Pivot.ACTIVE),
-        "&Active handle",
-        tip="Several handles turn and scale about the one chosen last.",
-        needs=has_scene,
-        menu="Ha&ndle/Pi&vot",
-        group="pivot",
-        checkable=True,
-    ),
-    A(
-        "handle.pivot_point",
-        partial(HandleActions.pivot, pivot=Pivot.POINT),
-        "&Placed point",
-        tip="Handles turn and scale about a point; Shift + right click on the surface places it.",
-        needs=has_scene,
-        menu="Ha&ndle/Pi&vot",
-        group="pivot",
-        checkable=True,
+    *(
+        A(
+            f"handle.pivot_{name}",
+            partial(HandleActions.pivot, pivot=pivot),
+            text,
+            tip=tip,
+            needs=has_scene,
+            menu="Ha&ndle/Pi&vot",
+            group="pivot",
+            checkable=True,
+        )
+        for name, pivot, text, tip in PIVOTS
     ),
     A(
         "handle.next_pivot",

@@ -41,17 +41,11 @@ class PoseActions:
         else:
             self._toast.say("No pose was copied yet: choose a handle and press Ctrl+C.")
 
-    def mirror_x(self) -> None:
-        """Mirror left and right."""
-        self._mirror_across(0)
-
-    def mirror_y(self) -> None:
-        """Mirror front and back."""
-        self._mirror_across(1)
-
-    def mirror_z(self) -> None:
-        """Mirror up and down."""
-        self._mirror_across(2)
+    def mirror_across(self, *, axis: int) -> None:
+        """Mirror left and right (0), front and back (1), or up and down (2)."""
+        scene = self._session.shown_scene
+        # Row by row the axes of the placed scene in the file's coordinates.
+        self._mirror(Plane(object_center(scene.ellipses.centers), scene.edit.place.rotation[axis]))
 
     def mirror_symmetry(self) -> None:
         """Mirror about the object's own symmetry plane, which is looked for first."""
@@ -72,11 +66,6 @@ class PoseActions:
             return symmetry_plane(centers, progress=job.progress("symmetry"))
 
         self._session.worker.submit(Job("symmetry", "Looking for the symmetry of the object", look, done))
-
-    def _mirror_across(self, axis: int) -> None:
-        scene = self._session.shown_scene
-        # Row by row the axes of the placed scene in the file's coordinates.
-        self._mirror(Plane(object_center(scene.ellipses.centers), scene.edit.place.rotation[axis]))
 
     def _mirror(self, plane: Plane) -> None:
         scene = self._session.shown_scene

@@ -87,32 +87,8 @@ class ViewActions(QObject):
         if flown_to is asked or self._viewport.camera.view.is_near(asked):
             self.fly_to(self._viewport.frame())
 
-    def front(self) -> None:
-        """Look at the front."""
-        self._look_from(1, -1.0)
-
-    def back(self) -> None:
-        """Look at the back."""
-        self._look_from(1, 1.0)
-
-    def right(self) -> None:
-        """Look from the right."""
-        self._look_from(0, 1.0)
-
-    def left(self) -> None:
-        """Look from the left."""
-        self._look_from(0, -1.0)
-
-    def top(self) -> None:
-        """Look down."""
-        self._look_from(2, 1.0)
-
-    def bottom(self) -> None:
-        """Look up."""
-        self._look_from(2, -1.0)
-
-    def _look_from(self, axis: int, sign: float) -> None:
-        """Fly to the end of one of right, away and up."""
+    def look_from(self, *, axis: int, sign: float) -> None:
+        """Fly to an end of right (0), away (1) or up (2), and look back."""
         camera = self._viewport.camera
         self.fly_to(camera.look_from(sign * scene_axes(camera.world_up)[axis]))
 

@@ -1,5 +1,7 @@
 """The actions that change what is seen: keys and frames, display, camera and window."""
 
+from functools import partial
+
 from splap_editor.ui.actions.action_spec import ActionSpec
 from splap_editor.ui.actions.conditions import has_handles, has_keys, has_scene, has_weights, is_on_key
 from splap_editor.ui.actions.display_actions import DisplayActions
@@ -7,6 +9,15 @@ from splap_editor.ui.actions.timeline_actions import TimelineActions
 from splap_editor.ui.actions.view_actions import ViewActions
 
 A = ActionSpec
+
+SIDES = (
+    ("front", 1, -1.0, "F&ront", ("Alt+1", "Num+1"), "Look at the front."),
+    ("back", 1, 1.0, "&Back", ("Alt+Ctrl+1", "Ctrl+Num+1"), "Look at the back."),
+    ("right", 0, 1.0, "R&ight", ("Alt+3", "Num+3"), "Look from the right."),
+    ("left", 0, -1.0, "&Left", ("Alt+Ctrl+3", "Ctrl+Num+3"), "Look from the left."),
+    ("top", 2, 1.0, "&Top", ("Alt+7", "Num+7"), "Look down."),
+    ("bottom", 2, -1.0, "Botto&m", ("Alt+Ctrl+7", "Ctrl+Num+7"), "Look up."),
+)
 
 VIEW_TABLE: tuple[ActionSpec, ...] = (
     A(
@@ -206,51 +217,17 @@ VIEW_TABLE: tuple[ActionSpec, ...] = (
         needs=has_scene,
         menu="&View",
     ),
-    A(
-        "view.front",
-        ViewActions.front,
-        "F&ront",
-        ("Alt+1", "Num+1"),
-        tip="Look at the front.",
-        needs=has_scene,
-        menu="&View/A&xis",
-    ),
-    A(
-        "view.back",
-        ViewActions.back,
-        "&Back",
-        ("Alt+Ctrl+1", "Ctrl+Num+1"),
-        tip="Look at the back.",
-        needs=has_scene,
-        menu="&View/A&xis",
-    ),
-    A(
-        "view.right",
-        ViewActions.right,
-        "R&ight",
-        ("Alt+3", "Num+3"),
-        tip="Look from the right.",
-        needs=has_scene,
-        menu="&View/A&xis",
-    ),
-    A(
-        "view.left",
-        ViewActions.left,
-        "&Left",
-        ("Alt+Ctrl+3", "Ctrl+Num+3"),
-        tip="Look from the left.",
-        needs=has_scene,
-        menu="&View/A&xis",
-    ),
-    A("view.top", ViewActions.top, "&Top", ("Alt+7", "Num+7"), tip="Look down.", needs=has_scene, menu="&View/A&xis"),
-    A(
-        "view.bottom",
-        ViewActions.bottom,
-        "Botto&m",
-        ("Alt+Ctrl+7", "Ctrl+Num+7"),
-        tip="Look up.",
-        needs=has_scene,
-        menu="&View/A&xis",
+    *(
+        A(
+            f"view.{name}",
+            partial(ViewActions.look_from, axis=axis, sign=sign),
+            text,
+            keys,
+            tip=tip,
+            needs=has_scene,
+            menu="&View/A&xis",
+        )
+        for name, axis, sign, text, keys, tip in SIDES
     ),
     A(
         "view.orthographic",

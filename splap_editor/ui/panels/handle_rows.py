@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QSize, Qt
@@ -24,15 +25,17 @@ class ListRow(QFrame):
 
     Parameters
     ----------
-    panel : HandlesPanel
-        Does what the row is asked.
+    choose : callable
+        ``choose(add)`` chooses what it stands for, or that as well.
+    rename : callable
+        ``rename(name)`` names it; empty for the usual name.
     """
 
-    def __init__(self, panel: HandlesPanel) -> None:
+    def __init__(self, choose: Callable[[bool], None], rename: Callable[[str], None]) -> None:
         super().__init__()
         self.setObjectName("handleRow")
-        self._panel = panel
-        self.name = NameField(self)
+        self._choose, self._rename = choose, rename
+        self.name = NameField(choose)
         self.name.editingFinished.connect(self._on_renamed)
         self.delete = tool_button("trash", "Delete")
         self._layout = QHBoxLayout(self)
@@ -57,36 +60,28 @@ class ListRow(QFrame):
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """Choose it."""
-        self.choose(add=bool(event.modifiers() & _MORE))
-
-    def choose(self, *, add: bool) -> None:
-        """Choose it, or one more."""
-        raise NotImplementedError
-
-    def rename(self, name: str) -> None:
-        """Take a name; empty for the usual one."""
-        raise NotImplementedError
+        self._choose(bool(event.modifiers() & _MORE))
 
     def _on_renamed(self) -> None:
         self.name.clearFocus()
-        self.rename(self.name.text().strip())
+        self._rename(self.name.text().strip())
 
 
 class NameField(QLineEdit):
     """A name that is edited in place; a click chooses its row too, and with Shift or Ctrl does no more than that."""
 
-    def __init__(self, row: ListRow) -> None:
+    def __init__(self, choose: Callable[[bool], None]) -> None:
         super().__init__()
         self.setToolTip("Rename")
         self.setObjectName("nameField")
-        self._row = row
+        self._choose = choose
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """Choose the row, and edit."""
         if event.modifiers() & _MORE:
-            self._row.choose(add=True)
+            self._choose(True)
             return
-        self._row.choose(add=False)
+        self._choose(False)
         super().mousePressEvent(event)
 
 
@@ -94,8 +89,11 @@ class HandleRow(ListRow):
     """Switch, swatch, name, reset and delete of one handle."""
 
     def __init__(self, handle_id: int, panel: HandlesPanel) -> None:
-        super().__init__(panel)
-        self._id = handle_id
+        super().__init__(
+            lambda add: panel.choose_handle(handle_id, add=add),
+            lambda name: panel.change_handle(handle_id, "Rename handle", name=name or f"Handle {handle_id}"),
+        )
+        self._id, self._panel = handle_id, panel
         self._color = ""
         self.swatch = QToolButton(autoRaise=True)
         self.swatch.setToolTip("Colour")
@@ -118,14 +116,6 @@ class HandleRow(ListRow):
         self.is_enabled.setChecked(handle.enabled)
         self.reset.setEnabled(not handle.pose.is_identity)
 
-    def choose(self, *, add: bool) -> None:
-        """Choose the handle, or one more."""
-        self._panel.choose_handle(self._id, add=add)
-
-    def rename(self, name: str) -> None:
-        """Name the handle."""
-        self._panel.change_handle(self._id, "Rename handle", name=name or f"Handle {self._id}")
-
     def _on_swatch_clicked(self) -> None:
         dialog = QColorDialog(QColor(self._color), self)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
@@ -139,19 +129,21 @@ class PinRow(ListRow):
     """Mark, name, number of splats and delete of one pin."""
 
     def __init__(self, pin_id: int, panel: HandlesPanel) -> None:
-        super().__init__(panel)
-        self._id = pin_id
+        super().__init__(
+            lambda add: panel.choose_pin(pin_id, add=add),
+            lambda name: panel.change_pin(pin_id, "Rename pin", name=name or f"Pin {pin_id}"),
+        )
         # As wide as a handle's switch and swatch: names stand under names.
         self._mark = QToolButton(autoRaise=True)
         self._mark.setToolTip("Pin: stays where it is")
         self._mark.setFixedSize(20, 20)
         self._mark.setStyleSheet(swatch_style(PIN_COLOR, "0px"))
-        self._mark.clicked.connect(lambda: self.choose(add=False))
+        self._mark.clicked.connect(lambda: panel.choose_pin(pin_id, add=False))
         space = QWidget()
         space.setFixedWidth(self._switch_width())
         self.held = PlainLabel()
         self.held.setProperty("tone", "quiet")
-        self.delete.clicked.connect(lambda: panel.delete_pin(self._id))
+        self.delete.clicked.connect(lambda: panel.delete_pin(pin_id))
         self.lay_out(space, self._mark, after=(self.held,))
 
     def show_pin(self, pin: Pin, n_splats: int) -> None:
@@ -160,14 +152,6 @@ class PinRow(ListRow):
             self.name.setText(pin.name)
         self.held.setText(f"{n_splats:,}")
         self.held.setToolTip(f"Holds {n_splats:,} splats")
-
-    def choose(self, *, add: bool) -> None:
-        """Choose the pin, or one more."""
-        self._panel.choose_pin(self._id, add=add)
-
-    def rename(self, name: str) -> None:
-        """Name the pin."""
-        self._panel.change_pin(self._id, "Rename pin", name=name or f"Pin {self._id}")
 
     def _switch_width(self) -> int:
         return QCheckBox().sizeHint().width()

@@ -1,7 +1,7 @@
 """Frames as files: posed on the worker, drawn on the main thread between its events."""
 
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,15 +11,13 @@ from numpy.typing import NDArray
 from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
 from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.edit import binds_like
-from splap_editor.engine.frames import FramePoser, drawn_frames, frame_path, frame_poser, write_frames, write_pictures
-from splap_editor.io.png import write_png
-from splap_editor.io.video import is_video, write_video
+from splap_editor.engine.frames import FramePoser, drawn_frames, frame_poser, write_frames, write_pictures
 from splap_editor.session.jobs import Job
 from splap_editor.session.scene import Scene
 from splap_editor.session.session import Session
 from splap_editor.session.side_by_side import side_by_side
 from splap_editor.viewport.camera import View
-from splap_editor.viewport.studio import Studio, turntable_views
+from splap_editor.viewport.studio import Studio, drawn_round
 from splap_editor.viewport.viewport import Viewport
 
 POLL_S = 0.05
@@ -112,26 +110,14 @@ def submit_frames(
 
 def _draw(desk: "_Desk", order: FrameOrder, poses: FramePoser, fps: float, job: Job) -> list[Path]:
     """Draw frames of an animation or a turn all round, into pictures or a video; runs on the worker."""
-    frames, path, progress = order.frames, order.path, job.progress("frames")
-    if order.kind == "pictures" and is_video(path):
-        write_video(path, drawn_frames(poses, frames, lambda k: desk.picture(job, k), progress=progress), fps)
-        return [path]
+    progress = job.progress("frames")
     if order.kind == "pictures":
-        return write_pictures(poses, frames, path, lambda k: desk.picture(job, k), write_png, progress=progress)
-    kernels = poses.kernels(None)
-
-    def turned() -> Iterator[NDArray[np.uint8]]:
-        for number, view in enumerate(turntable_views(desk.view, len(frames), desk.up), start=1):
-            yield desk.picture(job, kernels, view)
-            progress(number / len(frames))
-
-    if is_video(path):
-        write_video(path, turned(), fps)
-        return [path]
-    written = [frame_path(path, number, len(frames)) for number in range(1, len(frames) + 1)]
-    for each, picture in zip(written, turned(), strict=True):
-        write_png(each, picture)
-    return written
+        pictures = drawn_frames(poses, order.frames, lambda kernels: desk.picture(job, kernels), progress=progress)
+    else:
+        rest = poses.kernels(None)
+        n, draw = len(order.frames), lambda view: desk.picture(job, rest, view)
+        pictures = drawn_round(desk.view, n, desk.up, draw, progress=progress)
+    return write_pictures(order.path, pictures, order.frames, fps)
 
 
 class _Desk:
