@@ -29,7 +29,13 @@ PRESETS = {
         "As in the paper",
         "The published method: its rule and Laplacian, ten plain iterations or linear blending, its own adaptation.",
         changes={
-            GraphOptions: {"rule": "paper", "k": 30, "neighborhood": "geodesic", "laplacian": "robust"},
+            GraphOptions: {
+                "rule": "paper",
+                "carriers": "all",
+                "k": 30,
+                "neighborhood": "geodesic",
+                "laplacian": "robust",
+            },
             ArapOptions: {"kind": "local-global", "iterations": 10},
             BbwOptions: {"blending": "linear"},
             AdaptationOptions: {"adaptation": "paper"},

@@ -36,13 +36,7 @@ def scene_info(file: SplatFile) -> tuple[dict, Ellipses]:
 
 def flatness(splats: Splats) -> dict[str, float]:
     """Percentiles of smallest by middle scale; 0 is a disc, 1 a ball. Two-scale splats are discs."""
-    if splats.n_scales == 2:
-        return {"p5": 0.0, "p50": 0.0, "p95": 0.0}
-    # A signalling NaN complains when it is made wider.
-    with np.errstate(invalid="ignore", over="ignore"):
-        scales = np.sort(np.asarray(splats.log_scales, np.float64), axis=1)
-        ratios = np.exp(scales[:, 0] - scales[:, 1])
-    ratios = ratios[np.isfinite(ratios)]
+    ratios = splats.thinness[np.isfinite(splats.thinness)]
     if not ratios.size:
         return {"p5": 0.0, "p50": 0.0, "p95": 0.0}
     p5, p50, p95 = np.percentile(ratios, (5, 50, 95))

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
+from splap_editor.core.graph.carriers import carriers_of, carrying
 from splap_editor.core.graph.ellipse_offset import normal_offsets
 from splap_editor.core.graph.options import GraphOptions
 from splap_editor.core.graph.splat_graph import SplatGraph, splat_graph
@@ -146,7 +147,8 @@ def write_graph(
         ``stages(name)`` gives the progress callback of a stage.
     """
     stages("occupancy")
-    ellipses = occupancy_ellipses(file.splats)
+    visible = occupancy_ellipses(file.splats)
+    ellipses = carrying(visible, carriers_of(visible, file.splats, options))
     graph = splat_graph(ellipses, options, progress=stages("graph"))
     stages("offsets")
     offsets = normal_offsets(ellipses, graph.edges).min(axis=1)

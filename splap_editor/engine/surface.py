@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from splap_editor.core.adaptation.kernel_binding import KernelBinding
-from splap_editor.core.graph.carriers import carrying
+from splap_editor.core.graph.carriers import carriers_of, carrying
 from splap_editor.core.graph.options import GRAPH_RULES, LAPLACIANS, NEIGHBORHOODS, GraphOptions
 from splap_editor.core.graph.splat_graph import SplatGraph, require_mendable
 from splap_editor.core.index_spaces import FileMask, RowPair
@@ -157,10 +157,11 @@ def surface_of(
     asked, options = options, _without_removed(options, ellipses)
     visible = ellipses
     plain = unmended(options)
-    if near is not None and near.visible is visible and near.options.carriers == options.carriers:
+    carries = carriers_of(visible, splats, options)
+    if near is not None and near.visible is visible and np.array_equal(near.ellipses.rows, visible.rows[carries]):
         ellipses = near.ellipses
     else:
-        ellipses = carrying(visible, options.carriers)
+        ellipses = carrying(visible, carries)
     require_mendable(ellipses, options)
     # Tolerances are in units of the scene's size, which opacities have a say in too.
     made_from = (ellipses.centers, ellipses.semi_axes, ellipses.rows, ellipses.scene_scale)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from splap_editor.core.graph.carriers import SOLID
+from splap_editor.core.graph.carriers import MOST_FAINT, SOLID
 from splap_editor.core.index_spaces import FileRows
 from splap_editor.core.splats.occupancy import Ellipses, InertReason
 from splap_editor.core.splats.splats import Splats
@@ -90,15 +90,20 @@ def verdict(splats: Splats) -> tuple[str, str]:
     tone : str
         ``""`` or ``"warning"``.
     """
+    if splats.is_flat:
+        return "Flat splats: connections follow the surface.", ""
     shares = flatness(splats)
     middle, high = shares["p50"], shares["p95"]
-    if middle < 0.1 and high < 0.5:
-        return "Flat splats: connections follow the surface.", ""
     hazy = float(np.mean(splats.opacities < SOLID))
+    if hazy > MOST_FAINT:
+        return (
+            "Most splats are faint: haze and surface cannot be told apart. Do not trust thin parts and gaps.",
+            "warning",
+        )
     if hazy > HAZY:
         return (
-            f"Haze: {hazy:.0%} of the splats are fainter than {SOLID:g} and may hold parts together that only come "
-            'close. Let them follow ("Made of" in the Graph panel), and separate what touches.',
+            f"Haze: {hazy:.0%} of the splats are fainter than {SOLID:g}; they follow the surface and hold nothing "
+            "together. What lies behind them may still connect across gaps: separate what touches.",
             "warning",
         )
     if middle < 0.3 and high >= 0.5:

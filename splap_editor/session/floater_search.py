@@ -118,7 +118,12 @@ def floater_search(
         ``alone(progress)`` is entered around a graph search.
     """
     graph: SplatGraph | None = None
-    if surface is not None and surface.options == GraphOptions() and _leaves_out(surface, removal):
+    if (
+        surface is not None
+        and surface.options == GraphOptions()
+        and surface.ellipses is surface.visible
+        and _leaves_out(surface, removal)
+    ):
         ellipses, graph = surface.ellipses, surface.graph
     else:
         ellipses = occupancy_ellipses(splats, removed=removal.mask)

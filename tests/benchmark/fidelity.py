@@ -51,7 +51,12 @@ OBJECTS = {
 }
 TRAINED = {"bench": "bench_2dgs.ply"}
 """Trained scenes whose mesh is a shape of the sample maker."""
-RULES = {"paper": GraphOptions(rule="paper"), "touch": GraphOptions(), "solid": GraphOptions(carriers="solid")}
+RULES = {
+    "paper": GraphOptions(rule="paper", carriers="all"),
+    "default": GraphOptions(),
+    "touch": GraphOptions(carriers="all"),
+    "solid": GraphOptions(carriers="solid"),
+}
 RADII = (0.05, 0.075, 0.1)
 
 Solver = Callable[[NDArray[np.float64], sp.csr_matrix, NDArray[np.int64], NDArray[np.float64]], Deformation]

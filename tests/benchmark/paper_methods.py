@@ -191,7 +191,7 @@ def _unbound(splats: Splats) -> KernelBinding:
     return KernelBinding(splats, ellipses, none)
 
 
-PAPER = GraphOptions(rule="paper", k=30, laplacian="robust")
+PAPER = GraphOptions(rule="paper", k=30, laplacian="robust", carriers="all")
 
 METHODS: dict[str, Method] = {
     "ours": Method("SpLap Editor", on_graph(GraphOptions())),

@@ -27,11 +27,16 @@ def session(main, tmp_path):
 def test_faint_splats_follow_a_bent_surface_and_undo_takes_them_back(main, session):
     bent(main, session)
     scene = session.scene
-    n_visible = scene.ellipses.n_nodes
+    n_visible = scene.visible.n_nodes
+    faint = scene.splats.opacities < 0.1
+    assert scene.ellipses.n_nodes == np.count_nonzero(~faint)
+    options = replace(scene.edit.graph, carriers="all")
+    session.steps.change_edit(scene.edit.with_options(options), "Change graph")
+    main.run_until(lambda: session.state == "settled" and scene.surface.options.carriers == "all")
+    assert scene.ellipses.n_nodes == n_visible
     options = replace(scene.edit.graph, carriers="solid")
     session.steps.change_edit(scene.edit.with_options(options), "Change graph")
     main.run_until(lambda: session.state == "settled" and scene.surface.options.carriers == "solid")
-    faint = scene.splats.opacities < 0.1
     assert scene.ellipses is scene.surface.ellipses and scene.ellipses.n_nodes == np.count_nonzero(~faint)
     assert scene.visible.n_nodes == n_visible
     moved = np.linalg.norm(scene.positions - scene.splats.means, axis=1)

@@ -19,6 +19,12 @@ GRAPH_RULES = {
 """Rules by name: ``rule(tree, epsilon, progress)`` gives (E, 2) edges and their (E,) touch scales or None."""
 
 CARRIERS = {
+    "auto": Choice(
+        "What the splats are like",
+        "Splats fainter than 0.1 are haze and follow; unless the splats are flat, which lie in the surface however "
+        "faint, or most of them are faint.",
+        "splap_editor.core.graph.carriers:solid_unless_flat",
+    ),
     "all": Choice(
         "Every splat",
         "Every visible splat belongs to the surface.",
@@ -30,7 +36,7 @@ CARRIERS = {
         "splap_editor.core.graph.carriers:solid_splats",
     ),
 }
-"""Who makes up the surface, by name: ``carries(ellipses)`` gives (n,) bool; the others follow."""
+"""Who makes up the surface, by name: ``carries(ellipses, splats)`` gives (n,) bool; the others follow."""
 
 
 @dataclass(frozen=True)
@@ -191,7 +197,7 @@ class GraphOptions:
         "stars", "How the stars of all splats become a Laplacian.", label="Laplacian", choices=LAPLACIANS
     )
     carriers: str = option(
-        "all", "Which splats make up the surface; the others follow it.", label="Made of", choices=CARRIERS
+        "auto", "Which splats make up the surface; the others follow it.", label="Made of", choices=CARRIERS
     )
 
     def __post_init__(self) -> None:

@@ -67,6 +67,25 @@ class Splats:
         """Spherical-harmonic degree, 0 to 4."""
         return round((self.shN.shape[1] + 1) ** 0.5) - 1
 
+    @cached_property
+    def thinness(self) -> NDArray[np.float64]:
+        """(N,) smallest by middle scale: 0 is a disc, 1 a ball or a needle; 0 for two scales, NaN where undefined."""
+        if self.n_scales == 2:
+            return np.zeros(self.n_splats)
+        # A signalling NaN complains when it is made wider.
+        with np.errstate(invalid="ignore", over="ignore"):
+            scales = np.sort(np.asarray(self.log_scales, np.float64), axis=1)
+            return np.exp(scales[:, 0] - scales[:, 1])
+
+    @cached_property
+    def is_flat(self) -> bool:
+        """Whether they are discs: half of them thinner than a tenth of their width, nearly all than half of it."""
+        ratios = self.thinness[np.isfinite(self.thinness)]
+        if not ratios.size:
+            return True
+        middle, high = np.percentile(ratios, (50, 95))
+        return bool(middle < 0.1 and high < 0.5)
+
     def at(self, rows: NDArray[np.bool_]) -> "Splats":
         """Splats of some rows, by a mask (N,), as copies."""
         held: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
