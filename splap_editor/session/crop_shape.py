@@ -124,13 +124,20 @@ class CropShape:
         return replace(self, center=np.asarray(center, np.float64), halves=halves)
 
 
-def shape_about(subject: MainSubject, kind: CropKind, axes: NDArray[np.float64] | None = None) -> CropShape:
+def shape_about(
+    subject: MainSubject,
+    kind: CropKind,
+    axes: NDArray[np.float64] | None = None,
+    points: NDArray[np.floating] | None = None,
+) -> CropShape:
     """A shape with a little room about the main subject; a plane through its middle, across the third axis.
 
-    Its sides go along the rows of a rotation ``axes`` (3, 3), by default the axes of the file.
+    Its sides go along the rows of a rotation ``axes`` (3, 3), by default the axes of the file. Along others the
+    subject's ``points`` (n, 3) say more than the corners of its box do.
     """
     axes = np.eye(3) if axes is None else axes
-    extent = np.abs((subject.corners - subject.center) @ axes.T).max(axis=0)
+    around = subject.corners if points is None or not len(points) else points
+    extent = np.abs((around - subject.center) @ axes.T).max(axis=0)
     halves = _ROOM * np.maximum(extent, 1e-6 * max(subject.size, 1e-6))
     if kind is CropKind.PLANE:
         axes, halves = axes[[2, 0, 1]], halves[[2, 0, 1]]

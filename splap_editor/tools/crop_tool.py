@@ -157,7 +157,10 @@ class CropTool(Tool):
         """Show a shape about the subject."""
         self._is_dismissed = False
         scene = self.context.session.shown_scene
-        self.show(shape_about(scene.ellipses.subject, CropKind(self._options.value.kind), scene.edit.place.rotation))
+        axes, kind = scene.edit.place.rotation, CropKind(self._options.value.kind)
+        is_turned = not np.array_equal(axes, np.eye(3))
+        points = self.context.viewport.splats.subject_points() if is_turned else None
+        self.show(shape_about(scene.ellipses.subject, kind, axes, points))
 
     def drop(self) -> None:
         """Show no shape, and no tint."""

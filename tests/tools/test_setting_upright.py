@@ -196,3 +196,5 @@ def test_a_crop_of_a_placed_object_stands_along_the_axes_in_the_corner(hand):
     np.testing.assert_allclose([numbers.x, numbers.y, numbers.z], center, rtol=1e-5, atol=1e-6)
     assert numbers.width == pytest.approx(2.0 * place.scale * tool.shape.halves[0], rel=1e-6)
     assert not tool.goes().all()
+    along = (hand.viewport.splats.subject_points() - tool.shape.center) @ tool.shape.axes.T
+    np.testing.assert_allclose(tool.shape.halves, 1.05 * np.abs(along).max(axis=0), rtol=1e-6)
