@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
+    from splap_editor.core.camera_path import CameraPose
     from splap_editor.core.timeline import Timeline
     from splap_editor.engine.edit import Edit
     from splap_editor.engine.frames import FramePoser
@@ -74,6 +75,7 @@ def deform_frames(options: argparse.Namespace) -> int:
 def render(options: argparse.Namespace) -> int:
     """Draw a picture, one for each frame, or one for each step of a turntable."""
     from splap_editor.engine.frames import drawn_frames, frame_range, write_pictures
+    from splap_editor.viewport.camera import view_of
     from splap_editor.viewport.studio import drawn_round
 
     if options.turntable is not None and not 1 <= options.turntable <= LARGEST_TURNTABLE:
@@ -85,9 +87,15 @@ def render(options: argparse.Namespace) -> int:
     timeline = held.timeline if isinstance(held, SessionFile) else None
     frames = None
     if options.frames is not None:
-        if timeline is None:
-            raise ValueError("--frames needs keyframes: give a session saved by the editor with --session")
-        frames = frame_range(options.frames, timeline.n_frames)
+        if timeline is not None:
+            last = timeline.n_frames
+        elif isinstance(held, plain.Edit) and held.camera:
+            last = held.camera[-1].frame
+        else:
+            raise ValueError(
+                "--frames needs keyframes: give a session saved by the editor with --session, or a recipe with a camera"
+            )
+        frames = frame_range(options.frames, last)
     file, poser = _prepared(options, held, report)
     output, rate = options.output, _rate(options, timeline)
     makes_video = is_video(output)
@@ -103,16 +111,16 @@ def render(options: argparse.Namespace) -> int:
         def draw_view(seen: "View") -> "NDArray[np.uint8]":
             return studio.picture(seen, is_transparent=options.transparent)
 
-        def draw(kernels: "AdaptedKernels | None") -> "NDArray[np.uint8]":
+        def draw(kernels: "AdaptedKernels | None", camera: "CameraPose | None") -> "NDArray[np.uint8]":
             studio.pose(kernels)
-            return draw_view(view)
+            return draw_view(view if camera is None else view_of(camera))
 
         with report("pictures"):
             if frames is not None:
                 pictures = drawn_frames(poser, frames, draw, progress=report.progress)
                 written = write_pictures(output, pictures, frames, rate)
             elif options.turntable is None:
-                write_png(output, draw(poser.kernels(None)))
+                write_png(output, draw(poser.kernels(None), None))
                 written = [output]
             else:
                 studio.pose(poser.kernels(None))

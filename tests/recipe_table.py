@@ -3,6 +3,7 @@
 ``python -m tests.recipe_table`` writes it into the README.
 """
 
+from splap_editor.core.camera_path import CameraPose
 from splap_editor.core.deformers import DEFORMERS, method_titles
 from splap_editor.core.options import Option, ShareOfSize, options_of
 from splap_editor.core.presets import PRESETS
@@ -38,6 +39,12 @@ def recipe_table() -> str:
             "back",
         ),
         ("place", "`center`, `translate`, `rotate` (w, x, y, z), `scale`: all of it as one body, last of all"),
+        (
+            "camera",
+            "Where the camera stands at frames of a video: a list of `frame`, `position`, `target`, `up` (z by "
+            f"default), `angle` (field of view in degrees, {CameraPose.angle:g} by default), `parallel`; smooth in "
+            "between",
+        ),
     ]
     return "\n".join(["| key | meaning |", "|---|---|", *(f"| `{key}` | {told} |" for key, told in rows)]) + "\n"
 

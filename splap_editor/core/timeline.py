@@ -1,4 +1,4 @@
-"""Keyframes: the poses of all handles at some frames, and the poses in between."""
+"""Keyframes: the poses of all handles and the camera at some frames, and what is in between."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from splap_editor.core.bbw.rigid_curves import rigid_curve, scale_curve
+from splap_editor.core.camera_path import CameraKey, CameraPose, camera_between
 from splap_editor.core.pose import Pose
 from splap_editor.core.splats.rotations import matrices_to_quats, quats_to_matrices
 
@@ -39,6 +40,8 @@ class Timeline:
         Motion through the keys without corners; otherwise straight from one to the next.
     is_auto : bool
         Once there is a key, posing a handle sets one at the frame shown.
+    camera_keys : tuple of CameraKey
+        Likewise, of the camera.
     """
 
     keys: tuple[Key, ...] = ()
@@ -47,11 +50,12 @@ class Timeline:
     fps: float = 24.0
     is_smooth: bool = True
     is_auto: bool = True
+    camera_keys: tuple[CameraKey, ...] = ()
 
     def __post_init__(self) -> None:
-        frames = [key.frame for key in self.keys]
-        if frames != sorted(set(frames)) or (frames and not 1 <= frames[0] <= frames[-1] <= LAST_FRAME):
-            raise ValueError(f"keys must be at ascending frames from 1 to {LAST_FRAME}, got {frames}")
+        for frames in (list(self.key_frames), list(self.camera_key_frames)):
+            if frames != sorted(set(frames)) or (frames and not 1 <= frames[0] <= frames[-1] <= LAST_FRAME):
+                raise ValueError(f"keys must be at ascending frames from 1 to {LAST_FRAME}, got {frames}")
         if not 1 <= self.frame <= LAST_FRAME or not 1 <= self.n_frames <= LAST_FRAME or not 0.0 < self.fps <= 1000.0:
             raise ValueError(
                 f"frame and n_frames must be from 1 to {LAST_FRAME} and fps above 0 and up to 1000, "
@@ -62,6 +66,16 @@ class Timeline:
     def key_frames(self) -> tuple[int, ...]:
         """Frames with a key, ascending."""
         return tuple(key.frame for key in self.keys)
+
+    @property
+    def camera_key_frames(self) -> tuple[int, ...]:
+        """Frames with a camera key, ascending."""
+        return tuple(key.frame for key in self.camera_keys)
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether there is no key of either kind: nothing to play."""
+        return not self.keys and not self.camera_keys
 
     def with_key(self, frame: int, poses: Mapping[int, Pose]) -> "Timeline":
         """Set the key of a frame."""
@@ -78,6 +92,27 @@ class Timeline:
         if moved is None:
             raise KeyError(frame)
         return self.without_key(frame).with_key(to, moved.poses)
+
+    def with_camera_key(self, frame: int, pose: CameraPose) -> "Timeline":
+        """Set the camera key of a frame."""
+        others = [key for key in self.camera_keys if key.frame != frame]
+        keys = sorted((*others, CameraKey(frame, pose)), key=lambda key: key.frame)
+        return replace(self, camera_keys=tuple(keys))
+
+    def without_camera_key(self, frame: int) -> "Timeline":
+        """Delete the camera key of a frame, if there is one."""
+        return replace(self, camera_keys=tuple(key for key in self.camera_keys if key.frame != frame))
+
+    def with_camera_key_moved(self, frame: int, to: int) -> "Timeline":
+        """Move a camera key, as `with_key_moved` does."""
+        moved = next((key for key in self.camera_keys if key.frame == frame), None)
+        if moved is None:
+            raise KeyError(frame)
+        return self.without_camera_key(frame).with_camera_key(to, moved.pose)
+
+    def camera_at(self, frame: float) -> CameraPose | None:
+        """The keyed camera at any frame; None without a camera key. See `camera_between`."""
+        return camera_between(self.camera_keys, frame, is_smooth=self.is_smooth) if self.camera_keys else None
 
     def poses_at(self, frame: float, centers: Mapping[int, ArrayLike]) -> dict[int, Pose]:
         """Poses of the keyed handles at any frame.

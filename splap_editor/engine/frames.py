@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
+from splap_editor.core.camera_path import CameraPose
 from splap_editor.core.progress import Progress, Runner, in_turn, no_progress, part_of
 from splap_editor.core.splats.splats import Splats
 from splap_editor.core.timeline import LAST_FRAME
@@ -25,6 +26,7 @@ from splap_editor.io.splat_files import SplatFile, write_animation
 from splap_editor.io.video import is_video, write_video
 
 Pixels = TypeVar("Pixels")
+Draw = Callable[[AdaptedKernels | None, CameraPose | None], Pixels]
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +163,7 @@ def _write_skin(poser: FramePoser, file: SplatFile, frames: range, path: Path, p
 def drawn_frames(
     poser: FramePoser,
     frames: range,
-    draw: Callable[[AdaptedKernels | None], Pixels],
+    draw: Draw[Pixels],
     *,
     progress: Progress = no_progress,
 ) -> Iterator[Pixels]:
@@ -172,10 +174,10 @@ def drawn_frames(
     poser, frames, progress
         As of `write_frames`.
     draw : callable
-        Makes pixels of kernels.
+        ``draw(kernels, camera)`` makes pixels of them; ``camera`` is the keyed one, None without camera keys.
     """
     for done, kernels in _posed(poser, frames, progress):
-        yield draw(kernels)
+        yield draw(kernels, poser.edit.timeline.camera_at(frames[done]))
         progress((done + 1) / len(frames))
 
 

@@ -7,6 +7,7 @@ from splap_editor.core.handle_nodes import Region
 from splap_editor.core.removal import Finder as Find
 from splap_editor.core.removal import PickedRows
 from splap_editor.core.splats.splats import Splats
+from splap_editor.core.timeline import Timeline
 from splap_editor.engine.edit import HANDLE_COLORS, Edit, Handle, Pin
 from splap_editor.engine.removal import Removal, removal_of
 from splap_editor.io import plain_edit as plain
@@ -29,6 +30,7 @@ def recipe_of(edit: Edit, *, with_disabled: bool = False) -> plain.Edit:
         options=edit.options,
         remove=edit.removal.steps,
         place=edit.place,
+        camera=edit.timeline.camera_keys,
     )
 
 
@@ -64,6 +66,7 @@ def edit_of(recipe: plain.Edit, splats: Splats, find: Find | None = None) -> Edi
         options=recipe.options,
         removal=_removal(recipe, splats, find),
         place=recipe.place,
+        timeline=Timeline(camera_keys=recipe.camera),
     )
 
 

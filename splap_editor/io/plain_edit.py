@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from splap_editor.core.camera_path import CameraKey
 from splap_editor.core.options import Length, OptionSet
 from splap_editor.core.place import Place
 from splap_editor.core.pose import Pose
@@ -94,6 +95,8 @@ class Edit:
         Splats that are left out of everything.
     place : Place
         How all of it is moved, turned and scaled in the end.
+    camera : tuple of CameraKey
+        Where the camera stands at frames of a video, ascending; in the file's coordinates.
     """
 
     handles: tuple[Handle, ...] = ()
@@ -103,9 +106,11 @@ class Edit:
     rows_of: str = ""
     remove: tuple[RemovalStep, ...] = ()
     place: Place = field(default_factory=Place)
+    camera: tuple[CameraKey, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "handles", tuple(self.handles))
         object.__setattr__(self, "pins", tuple(self.pins))
         object.__setattr__(self, "remove", tuple(self.remove))
+        object.__setattr__(self, "camera", tuple(self.camera))
         object.__setattr__(self, "options", OptionSet(*self.options))

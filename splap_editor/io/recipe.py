@@ -16,6 +16,7 @@ from splap_editor.core.reach_options import CageOptions, ReachOptions
 from splap_editor.io.atomic_file import atomic_file
 from splap_editor.io.json_object import JsonObject, json_lines, parsed_json, shown
 from splap_editor.io.plain_edit import Edit, Handle, Pin, Vector
+from splap_editor.io.recipe_camera import camera_from_json, camera_to_json
 from splap_editor.io.recipe_removal import (
     PLACE_KEYS,
     place_from_json,
@@ -59,7 +60,7 @@ def recipe_groups() -> tuple[tuple[str, type], ...]:
 def recipe_keys() -> tuple[str, ...]:
     """Keys that a recipe may have."""
     keys = [key for key, group in recipe_groups() for key in ([key] if key else options_of(group))]
-    return ("version", "preset", "method", "rows_of", "handles", "pins", "remove", "place", *keys)
+    return ("version", "preset", "method", "rows_of", "handles", "pins", "remove", "place", "camera", *keys)
 
 
 class RecipeError(ValueError):
@@ -141,6 +142,7 @@ def recipe_from_json(value: Any) -> Edit:
         rows_of=recipe.text("rows_of", ""),
         remove=removal_from_json(recipe, "remove"),
         place=place_from_json(recipe.object("place", PLACE_KEYS)),
+        camera=camera_from_json(recipe, "camera"),
     )
 
 
@@ -213,6 +215,8 @@ def recipe_to_json(recipe: Edit) -> dict[str, Any]:
     if recipe.remove:
         value["remove"] = removal_to_json(recipe.remove)
     _put(value, "place", place_to_json(recipe.place))
+    if recipe.camera:
+        value["camera"] = camera_to_json(recipe.camera)
     return value
 
 

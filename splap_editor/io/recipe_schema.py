@@ -13,6 +13,7 @@ from splap_editor.core.pose import LARGEST_COORDINATE, SCALES
 from splap_editor.core.presets import PRESETS
 from splap_editor.core.reach_options import CageOptions
 from splap_editor.io.recipe import VERSION, recipe_groups
+from splap_editor.io.recipe_camera import camera_schema
 from splap_editor.io.recipe_removal import place_schema, removal_schema
 
 _ROW = {"type": "integer", "minimum": 0, "exclusiveMaximum": 2**31}
@@ -26,8 +27,9 @@ _POSITIVE = {"type": "number", "exclusiveMinimum": 0}
 def recipe_schema() -> dict[str, Any]:
     """Make the schema, draft 2020-12.
 
-    It accepts what `read_recipe` accepts, but for three things that JSON Schema does not tell apart or the reader does
-    not mind: 3.0 is a whole number, numbers beyond float64 are numbers, and a key that stands twice stands once.
+    It accepts what `read_recipe` accepts, but for what JSON Schema does not tell apart or the reader does not mind: 3.0
+    is a whole number, numbers beyond float64 are numbers, a key that stands twice stands once, and a camera may look
+    along its upward vector, at itself, and have its frames in any order.
     """
     properties: dict[str, Any] = {
         "version": {"const": VERSION},
@@ -44,7 +46,7 @@ def recipe_schema() -> dict[str, Any]:
     for key, group in recipe_groups():
         options = {name: _option(known) for name, known in options_of(group).items()}
         properties.update({key: _object(options)} if key else options)
-    properties |= {"remove": removal_schema(), "place": place_schema()}
+    properties |= {"remove": removal_schema(), "place": place_schema(), "camera": camera_schema()}
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "SpLap recipe",

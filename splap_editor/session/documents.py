@@ -137,7 +137,7 @@ class Documents:
         """
         if not self.is_dirty:
             return False
-        return self._session.has_unexported_work or bool(self._session.shown_scene.edit.timeline.keys)
+        return self._session.has_unexported_work or not self._session.shown_scene.edit.timeline.is_empty
 
     def file_of(self, state: SavedState, folder: Path | None) -> SessionFile:
         """Session file of a state, with the hash of the PLY as far as it is known."""

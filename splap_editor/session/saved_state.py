@@ -123,7 +123,9 @@ def session_edit(session: SessionFile, splats: Splats, find: Find | None = None)
             replace(pin, pin_id=settings.pin_id, reach=settings.reach)
             for pin, settings in zip(pins, session.pins, strict=True)
         )
-    return replace(edit, handles=handles, pins=pins, timeline=session.timeline)
+    # The camera's keys are the recipe's.
+    timeline = replace(session.timeline, camera_keys=edit.timeline.camera_keys)
+    return replace(edit, handles=handles, pins=pins, timeline=timeline)
 
 
 def restore_scene(scene: Scene, session: SessionFile, find: Find | None = None) -> None:

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 from vtkmodules.vtkCommonMath import vtkMatrix4x4
 from vtkmodules.vtkRenderingCore import vtkCamera, vtkRenderer
 
+from splap_editor.core.camera_path import CameraPose
 from splap_editor.core.place import Place, file_points, placed_points
 from splap_editor.viewport.projection import Projection
 
@@ -58,6 +59,18 @@ class View:
         near = 1e-6 * other.distance
         mine, others = (np.concatenate([view.position, view.focal_point]) for view in (self, other))
         return bool(np.abs(mine - others).max() <= near)
+
+
+def view_of(pose: CameraPose) -> View:
+    """The view from where a keyed camera stands."""
+    eye, target, up = (np.array(v, np.float64) for v in (pose.position, pose.target, pose.up))
+    return View(eye, target, up / np.linalg.norm(up), pose.angle, pose.is_parallel)
+
+
+def camera_pose(view: View) -> CameraPose:
+    """What a key keeps of a view."""
+    eye, target, up = ((float(x), float(y), float(z)) for x, y, z in (view.position, view.focal_point, view.view_up))
+    return CameraPose(eye, target, up, float(view.angle), bool(view.is_parallel))
 
 
 def turn(axis: ArrayLike, angle_rad: float) -> NDArray[np.float64]:

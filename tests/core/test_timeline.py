@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from splap_editor.core.bbw.rigid_curves import rigid_exp
+from splap_editor.core.camera_path import CameraPose
 from splap_editor.core.handle_nodes import Region
 from splap_editor.core.timeline import Key, Timeline
 from splap_editor.engine.edit import Edit, Handle, Pose
@@ -101,3 +102,61 @@ def test_going_to_a_frame_sets_no_key():
 def test_an_id_of_a_deleted_handle_with_keys_is_not_given_again():
     edit = keyed_edit(edit_of_two(), 1).without_handles([2])
     assert edit.next_handle_id() == 3
+
+
+STAND = CameraPose((0.0, -4.0, 1.0), (0.0, 0.0, 0.0))
+SIDE = CameraPose((6.0, 0.0, 1.0), (0.0, 0.0, 0.5), (0.0, 0.0, 1.0), 50.0)
+
+
+@pytest.mark.parametrize("is_smooth", [True, False])
+def test_a_camera_key_is_hit_exactly_and_outside_the_keys_the_camera_stands(is_smooth):
+    timeline = Timeline(is_smooth=is_smooth).with_camera_key(9, SIDE).with_camera_key(3, STAND)
+    assert Timeline().camera_at(4) is None
+    assert timeline.camera_key_frames == (3, 9) and not timeline.is_empty and timeline.key_frames == ()
+    assert timeline.camera_at(1) == timeline.camera_at(3) == STAND
+    assert timeline.camera_at(9) == timeline.camera_at(50) == SIDE
+    assert timeline.with_camera_key_moved(3, 12).camera_key_frames == (9, 12)
+    assert timeline.without_camera_key(3).camera_at(3) == SIDE
+    with pytest.raises(KeyError):
+        timeline.with_camera_key_moved(5, 6)
+
+
+def test_between_keys_the_camera_goes_past_neither_and_turns_without_a_jump():
+    third = CameraPose((0.0, 3.0, 4.0), (0.0, 0.0, 0.5), angle=20.0)
+    timeline = Timeline().with_camera_key(1, STAND).with_camera_key(5, SIDE).with_camera_key(12, third)
+    keys = timeline.camera_keys
+    before = None
+    for frame in np.linspace(1, 12, 221):
+        pose = timeline.camera_at(frame)
+        left, right = (keys[0].pose, keys[1].pose) if frame < 5 else (keys[1].pose, keys[2].pose)
+        for name in ("distance", "angle"):
+            low, high = sorted((getattr(left, name), getattr(right, name)))
+            assert low - 1e-9 <= getattr(pose, name) <= high + 1e-9
+        ends = np.sort([left.target, right.target], axis=0)
+        assert (ends[0] - 1e-9 <= pose.target).all() and (pose.target <= ends[1] + 1e-9).all()
+        R = pose.matrix[:3, :3]
+        np.testing.assert_allclose(R.T @ R, np.eye(3), atol=1e-9)
+        if before is not None:
+            assert np.abs(pose.matrix - before).max() < 0.2
+        before = pose.matrix
+
+
+def test_keys_that_look_at_one_target_make_an_orbit_about_it():
+    timeline = Timeline().with_camera_key(1, STAND).with_camera_key(11, CameraPose((4.0, 0.0, 1.0), STAND.target))
+    for frame in np.linspace(1, 11, 30):
+        pose = timeline.camera_at(frame)
+        np.testing.assert_allclose(pose.target, STAND.target, atol=1e-12)
+        assert pose.distance == pytest.approx(STAND.distance, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        (((0, 0, 0), (0, 0, 0)), "away from"),
+        (((0, 0, 0), (0, 0, 1)), "across the line of sight"),
+        (((0, 0, 0), (0, 1, 0), (0, 0, 1), 180.0), "above 0 and below 180"),
+    ],
+)
+def test_a_camera_that_shows_nothing_is_refused(values, message):
+    with pytest.raises(ValueError, match=message):
+        CameraPose(*values)

@@ -10,6 +10,7 @@ from PySide6.QtGui import QKeySequence
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
+from splap_editor.core.camera_path import CameraPose
 from splap_editor.core.handle_nodes import Region
 from splap_editor.core.place import Place
 from splap_editor.core.pose import Pose
@@ -66,6 +67,8 @@ def base_edit(driver):
     driver.session.steps.add_handle(Region(centers[np.argmax(centers[:, 0])], 0.1), pose=Pose((0.05, 0.0, 0.1)))
     edit = keyed_edit(driver.scene.edit)
     edit = keyed_edit(replace(edit, timeline=replace(edit.timeline, frame=9)))
+    stand = CameraPose((0.0, -6.0, 1.0), (0.0, 0.0, 0.0))
+    edit = replace(edit, timeline=edit.timeline.with_camera_key(1, stand))
     driver.session.steps.change_edit(edit_at_frame(edit, 5), "Set keys")
     return driver.scene.edit
 
@@ -79,7 +82,7 @@ def prepared(driver, spec, edit):
     window.timeline_actions.play(False)
     # A flight that the key before began would go on, and pass for an effect of this one.
     driver.qtbot.waitUntil(lambda: not window.view.viewport.is_moving, timeout=WAIT_MS)
-    frame = 1 if spec.action_id == "timeline.delete_key" else 5
+    frame = 1 if spec.action_id in ("timeline.delete_key", "timeline.delete_camera_key") else 5
     shown = edit_at_frame(edit, frame)
     if spec.action_id.startswith("remove.restore"):
         rows = np.arange(n)

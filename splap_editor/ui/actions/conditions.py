@@ -117,13 +117,23 @@ def is_placed(state: State) -> bool:
 
 
 def has_keys(state: State) -> bool:
-    """There are keys."""
-    return state.scene is not None and bool(state.scene.edit.timeline.keys)
+    """There are keys, of handles or the camera."""
+    return state.scene is not None and not state.scene.edit.timeline.is_empty
 
 
 def is_on_key(state: State) -> bool:
     """The frame shown has a key."""
     return state.scene is not None and state.scene.edit.timeline.frame in state.scene.edit.timeline.key_frames
+
+
+def has_camera_keys(state: State) -> bool:
+    """There are camera keys."""
+    return state.scene is not None and bool(state.scene.edit.timeline.camera_keys)
+
+
+def is_on_camera_key(state: State) -> bool:
+    """The frame shown has a camera key."""
+    return state.scene is not None and state.scene.edit.timeline.frame in state.scene.edit.timeline.camera_key_frames
 
 
 def can_undo(state: State) -> bool:

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QWidget
 from splap_editor.core.timeline import Timeline
 from splap_editor.engine.edit import Edit
 from splap_editor.engine.keyframes import edit_at_frame, keyed_edit
+from splap_editor.session.scene import Scene
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.ui.actions.file_actions import sentence
@@ -18,6 +19,7 @@ from splap_editor.ui.dialogs.frames_dialog import FramesDialog
 from splap_editor.ui.timeline.frame_export import FrameOrder, submit_frames
 from splap_editor.ui.timeline.player import Player
 from splap_editor.ui.widgets.toast import Toast
+from splap_editor.viewport.camera import camera_pose, view_of
 from splap_editor.viewport.viewport import Viewport
 
 
@@ -43,8 +45,10 @@ class TimelineActions(QObject):
         self._viewport = viewport
         self._toast = toast
         self._is_shown = False
+        self._looks_through = True
+        self._looked: tuple[Scene, int] | None = None
         self.player = Player(session, viewport, self)
-        SceneFollower(session, self._show_if_keyed, edit_changed=self._show_if_keyed)
+        SceneFollower(session, self._on_edit, edit_changed=self._on_edit, preview_changed=self._follow_camera)
 
     @property
     def _edit(self) -> Edit:
@@ -84,13 +88,15 @@ class TimelineActions(QObject):
     def next_key(self) -> None:
         """Go to the next key."""
         timeline = self._edit.timeline
-        later = timeline.key_frames[bisect_right(timeline.key_frames, timeline.frame) :]
+        keyed = _keyed_frames(timeline)
+        later = keyed[bisect_right(keyed, timeline.frame) :]
         self.go_to(later[0] if later else timeline.frame)
 
     def previous_key(self) -> None:
         """Go to the key before."""
         timeline = self._edit.timeline
-        earlier = timeline.key_frames[: bisect_left(timeline.key_frames, timeline.frame)]
+        keyed = _keyed_frames(timeline)
+        earlier = keyed[: bisect_left(keyed, timeline.frame)]
         self.go_to(earlier[-1] if earlier else timeline.frame)
 
     def play(self, on: bool) -> None:
@@ -118,6 +124,38 @@ class TimelineActions(QObject):
     def move_key(self, frame: int, to: int) -> None:
         """Move a key to another frame."""
         self._change(self._edit.timeline.with_key_moved(frame, to), "Move key")
+
+    # ---------------------------------------------------------------- camera
+
+    def set_camera_key(self) -> None:
+        """Keep where the camera stands at the frame shown."""
+        timeline, pose = self._edit.timeline, camera_pose(self._viewport.camera.view)
+        self._change(timeline.with_camera_key(timeline.frame, pose), "Key camera")
+
+    def delete_camera_key(self) -> None:
+        """Delete the camera key at the frame shown."""
+        self.delete_camera_key_at(self._edit.timeline.frame)
+
+    def delete_camera_key_at(self, frame: int) -> None:
+        """Delete the camera key of a frame."""
+        self._change(self._edit.timeline.without_camera_key(frame), "Delete camera key")
+        self._look()
+
+    def move_camera_key(self, frame: int, to: int) -> None:
+        """Move a camera key to another frame."""
+        self._change(self._edit.timeline.with_camera_key_moved(frame, to), "Move camera key")
+        self._look()
+
+    def look_through(self, on: bool) -> None:
+        """Let the picture follow the camera keys from frame to frame, or leave it to the hand."""
+        self._looks_through = on
+        if on:
+            self._look()
+
+    @property
+    def looks_through(self) -> bool:
+        """Whether the picture follows the camera keys."""
+        return self._looks_through
 
     def change(self, label: str, **values: Any) -> None:
         """Change length, speed or interpolation."""
@@ -158,6 +196,27 @@ class TimelineActions(QObject):
         edit = replace(self._edit, timeline=timeline)
         self._session.steps.change_edit(edit_at_frame(edit, timeline.frame) if timeline.keys else edit, label)
 
-    def _show_if_keyed(self) -> None:
-        if self._edit.timeline.keys and not self._is_shown:
+    def _on_edit(self) -> None:
+        if not self._edit.timeline.is_empty and not self._is_shown:
             self.show(True)
+        self._follow_camera()
+
+    def _follow_camera(self) -> None:
+        """Look through the keyed camera where another frame is shown; a scene just opened keeps its view."""
+        scene = self._session.shown_scene
+        shown = scene, scene.shown_edit.timeline.frame
+        if self._looked is not None and self._looked[0] is scene and self._looked[1] != shown[1]:
+            self._look()
+        self._looked = shown
+
+    def _look(self) -> None:
+        timeline = self._session.shown_scene.shown_edit.timeline
+        pose = timeline.camera_at(timeline.frame)
+        if pose is not None and self._looks_through:
+            self._viewport.camera.view = view_of(pose)
+            self._viewport.camera_moved()
+
+
+def _keyed_frames(timeline: Timeline) -> list[int]:
+    """Frames with a key of any kind, ascending."""
+    return sorted({*timeline.key_frames, *timeline.camera_key_frames})

@@ -3,7 +3,15 @@
 from functools import partial
 
 from splap_editor.ui.actions.action_spec import ActionSpec
-from splap_editor.ui.actions.conditions import has_handles, has_keys, has_scene, has_weights, is_on_key
+from splap_editor.ui.actions.conditions import (
+    has_camera_keys,
+    has_handles,
+    has_keys,
+    has_scene,
+    has_weights,
+    is_on_camera_key,
+    is_on_key,
+)
 from splap_editor.ui.actions.display_actions import DisplayActions
 from splap_editor.ui.actions.timeline_actions import TimelineActions
 from splap_editor.ui.actions.view_actions import ViewActions
@@ -50,6 +58,35 @@ VIEW_TABLE: tuple[ActionSpec, ...] = (
         tip="Forget the key at this frame.",
         needs=is_on_key,
         menu="Ani&mation",
+    ),
+    A(
+        "timeline.set_camera_key",
+        TimelineActions.set_camera_key,
+        "Key &camera",
+        ("Ctrl+J",),
+        icon="camera-key",
+        tip="Keep where the camera stands at this frame: position, target and field of view.",
+        needs=has_scene,
+        menu="Ani&mation",
+        breaks=True,
+    ),
+    A(
+        "timeline.delete_camera_key",
+        TimelineActions.delete_camera_key,
+        "Delete camera ke&y",
+        ("Ctrl+Alt+J",),
+        tip="Forget the camera key at this frame.",
+        needs=is_on_camera_key,
+        menu="Ani&mation",
+    ),
+    A(
+        "timeline.look_through",
+        TimelineActions.look_through,
+        "Look &through the camera",
+        tip="From frame to frame the picture follows the camera keys; off, it stays where you put it.",
+        needs=has_camera_keys,
+        menu="Ani&mation",
+        checkable=True,
     ),
     A(
         "timeline.next_key",

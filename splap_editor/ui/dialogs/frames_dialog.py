@@ -94,7 +94,7 @@ class FramesDialog(QDialog):
         layout.addLayout(grid)
         layout.addWidget(buttons)
         self.kind.currentIndexChanged.connect(self._show)
-        self.kind.setCurrentIndex(0 if timeline.keys else 2)
+        self.kind.setCurrentIndex(0 if timeline.keys else 1 if timeline.camera_keys else 2)
         self._show()
 
     def _add_row(self, grid: QGridLayout, name: str, text: str, *widgets: QWidget) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
+from splap_editor.core.camera_path import CameraPose
 from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.edit import binds_like
 from splap_editor.engine.frames import FramePoser, drawn_frames, frame_poser, write_frames, write_pictures
@@ -16,7 +17,7 @@ from splap_editor.session.jobs import Job
 from splap_editor.session.scene import Scene
 from splap_editor.session.session import Session
 from splap_editor.session.side_by_side import side_by_side
-from splap_editor.viewport.camera import View
+from splap_editor.viewport.camera import View, view_of
 from splap_editor.viewport.studio import Studio, drawn_round
 from splap_editor.viewport.viewport import Viewport
 
@@ -65,7 +66,7 @@ def submit_frames(
     session : Session
         With a scene, whose surface is made where a handle is enabled.
     viewport : Viewport
-        Its camera, look and background are those of the pictures.
+        Its look and background are those of the pictures; its camera too, where the timeline has no camera keys.
     order : FrameOrder
     done : callable
         Given the written files.
@@ -111,8 +112,12 @@ def submit_frames(
 def _draw(desk: "_Desk", order: FrameOrder, poses: FramePoser, fps: float, job: Job) -> list[Path]:
     """Draw frames of an animation or a turn all round, into pictures or a video; runs on the worker."""
     progress = job.progress("frames")
+
+    def drawn(kernels: AdaptedKernels | None, camera: CameraPose | None) -> NDArray[np.uint8]:
+        return desk.picture(job, kernels, None if camera is None else view_of(camera))
+
     if order.kind == "pictures":
-        pictures = drawn_frames(poses, order.frames, lambda kernels: desk.picture(job, kernels), progress=progress)
+        pictures = drawn_frames(poses, order.frames, drawn, progress=progress)
     else:
         rest = poses.kernels(None)
         n, draw = len(order.frames), lambda view: desk.picture(job, rest, view)

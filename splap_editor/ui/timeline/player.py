@@ -47,7 +47,7 @@ class Player(QObject):
     def play(self) -> None:
         """Go on from the frame shown, or from the first if that is the last."""
         scene = self._session.scene
-        if self.is_playing or scene is None or not scene.edit.timeline.keys:
+        if self.is_playing or scene is None or scene.edit.timeline.is_empty:
             return
         timeline = scene.edit.timeline
         self._scene, self._shown = scene, None
@@ -70,7 +70,7 @@ class Player(QObject):
 
     def _on_tick(self) -> None:
         scene = self._scene
-        if scene is None or scene.preview not in (None, self._shown) or not scene.edit.timeline.keys:
+        if scene is None or scene.preview not in (None, self._shown) or scene.edit.timeline.is_empty:
             self.stop()
             return
         begun, first = self._start

@@ -33,6 +33,7 @@ class TimelineStrip(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self._session = session
         self._actions = actions
+        self._looks_through = lambda: timeline.looks_through
         self.ruler = TimelineRuler()
         self.frame_field = _field("Frame shown", 1, LAST_FRAME)
         self.length_field = _field("Number of frames", 1, LAST_FRAME)
@@ -40,7 +41,7 @@ class TimelineStrip(QWidget):
         layout = QHBoxLayout(self)
         layout.setContentsMargins(2 * STEP, STEP, 2 * STEP, STEP)
         layout.setSpacing(STEP)
-        for action_id in ("timeline.play", "timeline.set_key"):
+        for action_id in ("timeline.play", "timeline.set_key", "timeline.set_camera_key"):
             button = QToolButton()
             button.setDefaultAction(actions[action_id])
             button.setIconSize(QSize(18, 18))
@@ -55,6 +56,8 @@ class TimelineStrip(QWidget):
         self.ruler.chosen.connect(timeline.go_to)
         self.ruler.key_moved.connect(timeline.move_key)
         self.ruler.key_deleted.connect(timeline.delete_key_at)
+        self.ruler.camera_key_moved.connect(timeline.move_camera_key)
+        self.ruler.camera_key_deleted.connect(timeline.delete_camera_key_at)
         self.frame_field.committed.connect(lambda frame: timeline.go_to(int(frame)))
         self.length_field.committed.connect(lambda n: timeline.change("Change length", n_frames=int(n)))
         self.fps_field.committed.connect(lambda fps: timeline.change("Change speed", fps=float(fps)))
@@ -71,6 +74,7 @@ class TimelineStrip(QWidget):
         self.fps_field.show_value(timeline.fps)
         self._actions.check("timeline.smooth", timeline.is_smooth)
         self._actions.check("timeline.auto_key", timeline.is_auto)
+        self._actions.check("timeline.look_through", self._looks_through())
 
 
 def _field(tip: str, low: float, high: float) -> NumberField:
