@@ -24,7 +24,13 @@ cleanup() {
     fi
     [ -z "$xvfb" ] || kill "$xvfb" 2>/dev/null || true
     for place in tmp/.X11-unix dev proc; do
-        mountpoint -q "$root/$place" && umount "$root/$place"
+        # What just ended may hold a place for a moment more.
+        tries=0
+        while mountpoint -q "$root/$place" && ! umount "$root/$place" 2>/dev/null; do
+            tries=$((tries + 1))
+            [ "$tries" -lt 50 ] || { umount -l "$root/$place"; break; }
+            sleep 0.2
+        done
     done
     [ -n "${kept:-}" ] || rm -rf --one-file-system "$root"
     rm -rf "$log"
