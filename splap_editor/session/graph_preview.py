@@ -2,6 +2,7 @@
 
 from splap_editor.core.graph.options import GraphOptions, edges_only
 from splap_editor.core.graph.splat_graph import SplatGraph, mended_graph, splat_graph
+from splap_editor.core.splats.occupancy import Ellipses
 from splap_editor.engine.strokes import stroke_mends
 from splap_editor.engine.surface_stages import unmended
 from splap_editor.session.jobs import REPORT_SECONDS, Job
@@ -30,7 +31,8 @@ class GraphPreview:
         self.error = ""
         self._session = session
         self._job = LatestJob(session.detail_worker, "preview", cancels=True, failed=self._on_failed)
-        SceneFollower(session, self.clear)
+        self._ellipses: Ellipses | None = None
+        SceneFollower(session, self.clear, surface_changed=self._on_surface_changed)
 
     @property
     def is_busy(self) -> bool:
@@ -45,6 +47,7 @@ class GraphPreview:
             return
         self.wanted, self.graph, self.share, self.error = options, None, 0.0, ""
         surface, ellipses, deliver = scene.surface, scene.ellipses, self._take_share
+        self._ellipses = ellipses
         if surface is not None and edges_only(surface.options) == options:
             self._job.drop()
             self._take(options, surface.graph)
@@ -72,6 +75,12 @@ class GraphPreview:
         self._job.drop()
         self.wanted, self.graph, self.error = None, None, ""
         self.changed.emit()
+
+    def _on_surface_changed(self) -> None:
+        # Its nodes are those of the ellipses it was made of: other carriers are other nodes.
+        scene = self._session.scene
+        if self.wanted is not None and scene is not None and scene.ellipses is not self._ellipses:
+            self.clear()
 
     def _take(self, options: GraphOptions, graph: SplatGraph) -> None:
         if options == self.wanted:

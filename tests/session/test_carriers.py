@@ -8,6 +8,7 @@ import pytest
 from splap_editor.engine.quantities import QUANTITIES
 from splap_editor.io.sample_maker import HAZE, shape_sample, write_sample
 from splap_editor.session.bound_edit import snapshot_of
+from splap_editor.session.graph_preview import GraphPreview
 from splap_editor.session.session import Session
 from tests.session.test_session import bent
 
@@ -49,3 +50,18 @@ def test_faint_splats_follow_a_bent_surface_and_undo_takes_them_back(main, sessi
     session.history.undo()
     main.run_until(lambda: session.state == "settled" and scene.surface.options.carriers == "all")
     assert scene.ellipses.n_nodes == n_visible and session.failures == []
+
+
+def test_a_previewed_graph_goes_with_the_nodes_it_is_of(main, session):
+    bent(main, session)
+    scene, preview = session.scene, GraphPreview(session)
+    options = replace(scene.edit.graph, epsilon=0.01)
+    preview.ask(options)
+    main.run_until(lambda: preview.graph is not None)
+    assert preview.graph.n_nodes == scene.ellipses.n_nodes
+    session.steps.change_edit(scene.edit.with_options(replace(scene.edit.graph, carriers="all")), "Change graph")
+    main.run_until(lambda: session.state == "settled" and scene.surface.options.carriers == "all")
+    assert preview.graph is None and preview.wanted is None
+    preview.ask(options)
+    main.run_until(lambda: preview.graph is not None)
+    assert preview.graph.n_nodes == scene.ellipses.n_nodes
