@@ -146,15 +146,17 @@ def write_splats(
     if extra:
         raise FormatError(f"{path.name} cannot hold the columns {', '.join(extra)}. Save them in a PLY.")
     kept = kept_rows(removed, file)
-    bare, _ = bare_splats(splats if kept is None else splats.at(kept), row.largest_degree)
+    kept_splats = splats if kept is None else splats.at(kept)
+    bare, _ = bare_splats(kept_splats, row.largest_degree, part_of(progress, 0.0, 0.1))
+    encoding = part_of(progress, 0.1, 1.0)
 
     def encoded(out: BinaryIO) -> None:
         if _is_kept(file, row):
             from splap_editor.io.formats.compressed import write_in_order
 
-            write_in_order(out, bare, progress)
+            write_in_order(out, bare, encoding)
         else:
-            row.write(out, bare, progress)
+            row.write(out, bare, encoding)
 
     _write_whole(path, encoded)
     progress(1.0)

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.progress import Progress, no_progress
 from splap_editor.core.splats.splats import Splats
 
 THIN_LOG_SCALE = float(np.log(1e-6))
@@ -15,7 +16,7 @@ FAINT, OPAQUE = -14.0, 14.0
 """Logits of what counts as invisible and as opaque: a millionth from 0 and from 1."""
 
 
-def bare_splats(splats: Splats, largest_degree: int = 3) -> tuple[Splats, int]:
+def bare_splats(splats: Splats, largest_degree: int = 3, progress: Progress = no_progress) -> tuple[Splats, int]:
     """Bring splats to what any 3DGS program understands.
 
     The 3-D filter of GOF is worked into scales and opacities, 2DGS splats get
@@ -27,6 +28,8 @@ def bare_splats(splats: Splats, largest_degree: int = 3) -> tuple[Splats, int]:
     splats : Splats
     largest_degree : int
         Spherical-harmonic degree that the format holds.
+    progress : Progress
+        Told the share done after each part of the splats; may cancel.
 
     Returns
     -------
@@ -43,11 +46,13 @@ def bare_splats(splats: Splats, largest_degree: int = 3) -> tuple[Splats, int]:
         else:
             log_scales = np.log(splats.scales).astype(np.float32)
             logits = (np.log(splats.opacities) - np.log1p(-splats.opacities)).astype(np.float32)
+        progress(0.2)
         quats = np.array(splats.quats, np.float32)
         lengths = np.sqrt(np.einsum("nc,nc->n", quats, quats))
         usable = np.isfinite(lengths) & (lengths > 0)
         usable &= ~np.isnan(log_scales).any(axis=1) & (log_scales < np.inf).all(axis=1) & ~np.isnan(logits)
         quats /= lengths[:, None]
+    progress(0.4)
     if splats.n_scales == 2:
         log_scales = np.column_stack([log_scales, np.full(n, THIN_LOG_SCALE, np.float32)])
     log_scales = np.maximum(log_scales, np.float32(THIN_LOG_SCALE))
@@ -57,14 +62,18 @@ def bare_splats(splats: Splats, largest_degree: int = 3) -> tuple[Splats, int]:
         quats[unusable] = 1, 0, 0, 0
         log_scales[unusable] = THIN_LOG_SCALE
         logits[unusable] = FAINT
+    progress(0.6)
+    sh0 = _finite(splats.sh0)
+    progress(0.7)
     bare = Splats(
         means=np.asarray(splats.means, np.float32),
         log_scales=log_scales,
         quats=quats,
         logit_opacities=logits,
-        sh0=_finite(splats.sh0),
+        sh0=sh0,
         shN=_finite(splats.shN[:, : (largest_degree + 1) ** 2 - 1]),
     )
+    progress(1.0)
     return bare, int(unusable.sum())
 
 

@@ -61,6 +61,7 @@ def _write(out: BinaryIO, splats: Splats, order: NDArray[np.int64], progress: Pr
     for lo in range(0, n if n_rest else 0, step * CHUNK):
         rest = splats.shN[order[lo : lo + step * CHUNK]].transpose(0, 2, 1).reshape(-1, n_rest)
         out.write(np.clip(np.floor((rest / 8 + 0.5) * 256), 0, 255).astype(np.uint8).tobytes())
+        progress(0.8 + 0.2 * min((lo + step * CHUNK) / n, 1.0))
     progress(1.0)
 
 

@@ -17,7 +17,7 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.progress import Progress, part_of
+from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.splats.rotations import matrices_to_quats, quat_products, quats_to_matrices
 from splap_editor.core.splats.splats import Splats
 from splap_editor.io.formats.bare_splats import FAINT, OPAQUE, alphas_of, as_bytes
@@ -42,6 +42,7 @@ _MOST_NODES = 1 << 16
 _MOST_ATTRIBUTES = 20
 """Four, and a coefficient of the harmonics each."""
 
+_BLOCK_BYTES = 1 << 22
 _BLOCK_ROWS = 1 << 15
 _EVEN = 1e-4
 
@@ -349,10 +350,8 @@ def _turn_and_factor(document: _Document, world: NDArray[np.float64]) -> tuple[N
 def write(out: BinaryIO, splats: Splats, progress: Progress) -> None:
     """Encode bare splats as a ``.glb``, every number as a float."""
     builder = GlbBuilder()
-    attributes = splat_attributes(builder, splats)
-    progress(0.5)
-    document = splat_document(attributes)
-    builder.write(out, document)
+    attributes = splat_attributes(builder, splats, part_of(progress, 0.0, 0.5))
+    builder.write(out, splat_document(attributes), part_of(progress, 0.5, 1.0))
     progress(1.0)
 
 
@@ -381,7 +380,7 @@ class GlbBuilder:
         self._length += values.nbytes + -values.nbytes % 4
         return len(self._accessors) - 1
 
-    def write(self, out: BinaryIO, document: dict[str, Any]) -> None:
+    def write(self, out: BinaryIO, document: dict[str, Any], progress: Progress = no_progress) -> None:
         """Write the file, with accessors, views and buffer added to a document."""
         document |= {"accessors": self._accessors, "bufferViews": self._views}
         document["buffers"] = [{"byteLength": self._length}]
@@ -390,15 +389,21 @@ class GlbBuilder:
         out.write(struct.pack("<4sII", MAGIC, 2, 12 + 8 + len(text) + 8 + self._length))
         out.write(struct.pack("<I4s", len(text), _JSON) + text)
         out.write(struct.pack("<I4s", self._length, _BIN))
+        done = 0
         for piece in self._pieces:
-            out.write(piece.data.cast("B"))
+            held = piece.data.cast("B")
+            for lo in range(0, len(held), _BLOCK_BYTES):
+                out.write(held[lo : lo + _BLOCK_BYTES])
+                progress((done + lo) / self._length)
             out.write(bytes(-piece.nbytes % 4))
+            done += piece.nbytes
 
 
-def splat_attributes(builder: GlbBuilder, splats: Splats) -> dict[str, int]:
+def splat_attributes(builder: GlbBuilder, splats: Splats, progress: Progress = no_progress) -> dict[str, int]:
     """Add the arrays of bare splats; gives the attributes of their primitive."""
     means = splats.means.astype("<f4")
     alphas = alphas_of(splats.logit_opacities)
+    progress(0.0)
     colors = as_bytes(np.column_stack([splats.sh0 * SH_C0 + 0.5, alphas]) * 255)
     bounds = {"min": means.min(axis=0).tolist(), "max": means.max(axis=0).tolist()}
     attributes = {
@@ -415,6 +420,7 @@ def splat_attributes(builder: GlbBuilder, splats: Splats) -> dict[str, int]:
             name = f"{EXTENSION}:SH_DEGREE_{degree}_COEF_{number}"
             attributes[name] = builder.add(splats.shN[:, at].astype("<f4"))
             at += 1
+            progress(at / splats.shN.shape[1])
     return attributes
 
 

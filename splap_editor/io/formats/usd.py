@@ -14,7 +14,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from splap_editor.core.progress import Progress
+from splap_editor.core.progress import Progress, no_progress
 from splap_editor.core.splats.splats import Splats
 from splap_editor.io.formats.bare_splats import FAINT, OPAQUE, alphas_of
 from splap_editor.io.formats.source import FormatError, Source
@@ -95,13 +95,13 @@ def _unpacked(source: Source, held: Path, progress: Progress) -> tuple[str, str]
 
 def write_usdc(out: BinaryIO, splats: Splats, progress: Progress) -> None:
     """Encode bare splats as a ``.usdc``."""
-    _write(out, [(1, splats)], 24.0, is_package=False)
+    _write(out, [(1, splats)], 24.0, is_package=False, progress=progress)
     progress(1.0)
 
 
 def write_usdz(out: BinaryIO, splats: Splats, progress: Progress) -> None:
     """Encode bare splats as a ``.usdz``."""
-    _write(out, [(1, splats)], 24.0, is_package=True)
+    _write(out, [(1, splats)], 24.0, is_package=True, progress=progress)
     progress(1.0)
 
 
@@ -115,7 +115,14 @@ def write_usdz_frames(out: BinaryIO, frames: Iterable[tuple[int, Splats]], rate:
     _write(out, frames, rate, is_package=True)
 
 
-def _write(out: BinaryIO, frames: Iterable[tuple[int, Splats]], rate: float, *, is_package: bool) -> None:
+def _write(
+    out: BinaryIO,
+    frames: Iterable[tuple[int, Splats]],
+    rate: float,
+    *,
+    is_package: bool,
+    progress: Progress = no_progress,
+) -> None:
     """Encode bare splats as a stage, time-sampled where there is more than one frame.
 
     Parameters
@@ -127,6 +134,8 @@ def _write(out: BinaryIO, frames: Iterable[tuple[int, Splats]], rate: float, *, 
         Frames per second.
     is_package : bool
         A ``.usdz``, which wraps a ``.usdc``.
+    progress : Progress
+        Told between arrays, and for each MiB written, of one frame.
     """
     _require_library()
     from pxr import Sdf, Usd, UsdGeom, UsdUtils
@@ -150,16 +159,20 @@ def _write(out: BinaryIO, frames: Iterable[tuple[int, Splats]], rate: float, *, 
                     attribute.Clear()
                     attribute.Set(values, numbers[0])
             arrays = _moving(splats)
+            progress(0.2)
             for name, values in arrays.items():
                 prim.GetAttribute(name).Set(values, number) if numbers else prim.GetAttribute(name).Set(values)
             kept = arrays if not numbers else {}
+            progress(0.4)
             if not numbers:
                 _set_still(prim, splats)
+                progress(0.5)
             numbers.append(number)
         if len(numbers) > 1:
             stage.SetStartTimeCode(numbers[0])
             stage.SetEndTimeCode(numbers[-1])
         stage.GetRootLayer().Save()
+        progress(0.8)
         if is_package:
             package = str(Path(folder) / "splats.usdz")
             UsdUtils.CreateNewUsdzPackage(Sdf.AssetPath(layer), package)
@@ -167,6 +180,7 @@ def _write(out: BinaryIO, frames: Iterable[tuple[int, Splats]], rate: float, *, 
         with open(layer, "rb") as file:
             while chunk := file.read(1 << 20):
                 out.write(chunk)
+                progress(0.9)
 
 
 def _moving(splats: Splats) -> dict[str, Any]:
