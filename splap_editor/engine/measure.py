@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.graph.splat_graph import SplatGraph
-from splap_editor.core.index_spaces import FileRow
+from splap_editor.core.index_spaces import FileRow, Node
 from splap_editor.core.place import Place
 from splap_editor.core.splats.occupancy import Ellipses
 from splap_editor.core.surface.geodesics import geodesic_distances
@@ -74,7 +74,7 @@ def measured(
     return Measured(place.scale * straight, place.scale * float(distances[nodes[1]]), path)
 
 
-def _way_back(graph: SplatGraph, distances: NDArray[np.float64], node: int) -> list[int]:
+def _way_back(graph: SplatGraph, distances: NDArray[np.float64], node: Node) -> list[Node]:
     """Nodes of a shortest path, from its end to where the distances are 0."""
     if not np.isfinite(distances[node]):
         return []

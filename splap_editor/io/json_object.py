@@ -7,6 +7,7 @@ from dataclasses import replace
 from difflib import get_close_matches
 from typing import Any, Literal, TypeVar, overload
 
+from splap_editor.core.index_spaces import FileRow
 from splap_editor.core.options import Option, options_of
 from splap_editor.core.pose import LARGEST_COORDINATE
 
@@ -174,7 +175,7 @@ class JsonObject:
             found.append((fine[0], fine[1], fine[2]))
         return tuple(found)
 
-    def rows(self, key: str) -> tuple[int, ...]:
+    def rows(self, key: str) -> tuple[FileRow, ...]:
         """A list of file rows with at least one in it."""
         value = self._value.get(key)
         if not isinstance(value, list | tuple) or not value:

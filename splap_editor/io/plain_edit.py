@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 from splap_editor.core.camera_path import CameraKey
+from splap_editor.core.index_spaces import FileRow
 from splap_editor.core.options import Length, OptionSet
 from splap_editor.core.place import Place
 from splap_editor.core.pose import Pose
@@ -31,7 +32,7 @@ class Pin:
 
     center: Vector | None = None
     radius: float | None = None
-    rows: tuple[int, ...] | None = None
+    rows: tuple[FileRow, ...] | None = None
     name: str = ""
 
 
@@ -63,7 +64,7 @@ class Handle:
     name: str = ""
     center: Vector | None = None
     radius: float | None = None
-    rows: tuple[int, ...] | None = None
+    rows: tuple[FileRow, ...] | None = None
     translate: Vector = (0.0, 0.0, 0.0)
     rotate: Quaternion = (1.0, 0.0, 0.0, 0.0)
     scale: float | Vector = 1.0

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.index_spaces import FileRow
 from splap_editor.core.progress import Progress, no_progress
 from splap_editor.io.ply_header import PlyElement, PlyError, PlyHeader
 from splap_editor.io.ply_table import CellChanges, NewColumn, PlyTable, replaced_cells
@@ -65,7 +66,7 @@ class ListTable(PlyTable):
         yield self.body[end:]
 
     def _widened_rows(
-        self, block: NDArray[np.uint8], offsets: NDArray[np.int64], row: int, new_columns: list[NewColumn]
+        self, block: NDArray[np.uint8], offsets: NDArray[np.int64], row: FileRow, new_columns: list[NewColumn]
     ) -> NDArray[np.uint8]:
         """Rows with new columns spliced in."""
         names = self.header.vertex.names

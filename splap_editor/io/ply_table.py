@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.index_spaces import FileRows
 from splap_editor.core.progress import Progress, no_progress
 from splap_editor.io.ply_header import PlyError, PlyHeader
 
@@ -153,7 +154,7 @@ def cast_values(values: NDArray, dtype: np.dtype) -> NDArray:
         return np.asarray(values).astype(dtype)
 
 
-def replaced_cells(name: str, column: str, before: NDArray, values: NDArray, rows: NDArray[np.intp]) -> NDArray:
+def replaced_cells(name: str, column: str, before: NDArray, values: NDArray, rows: FileRows) -> NDArray:
     """Values in a column's own type, on their way into the file.
 
     Parameters

@@ -10,6 +10,7 @@ from io import BytesIO
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.index_spaces import FileRow
 from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.io.ply_header import PlyElement, PlyError, PlyHeader
 from splap_editor.io.ply_table import CellChanges, NewColumn, PlyTable, cast_values, field_types, replaced_cells
@@ -242,14 +243,14 @@ def _parse_list_columns(
             raise _damage(name, row, "the promised numbers and lists") from None
 
 
-def _damage(name: str, row: int, wanted: str) -> PlyError:
+def _damage(name: str, row: FileRow, wanted: str) -> PlyError:
     """Exception for a line that holds something else than it should."""
     return PlyError(
         f"{name} is damaged or cut short: the line of row {row:,} is not {wanted}. Copy or export it again."
     )
 
 
-def _first_bad_line(text: bytes, row: int, n_columns: int) -> int:
+def _first_bad_line(text: bytes, row: FileRow, n_columns: int) -> int:
     """Row whose line does not hold that many numbers."""
     for line in text.splitlines():
         words = line.split()

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.index_spaces import FileMask
 from splap_editor.core.timeline import Timeline
 from splap_editor.io.plain_edit import Edit, Vector
 
@@ -101,7 +102,7 @@ class SessionFile:
     timeline: Timeline = field(default_factory=Timeline)
     view: ViewSpec | None = None
     display: Mapping[str, Scalar] = field(default_factory=dict)
-    selection: NDArray[np.bool_] | None = None
-    hidden: NDArray[np.bool_] | None = None
+    selection: FileMask | None = None
+    hidden: FileMask | None = None
     selection_sets: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
     document: str | None = None

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from splap_editor.core.graph.options import Joint
+from splap_editor.core.index_spaces import FileMask, FileRow
 from splap_editor.engine.surface import Surface
 from splap_editor.session.jobs import Job
 from splap_editor.session.joint_preview import FoundJoint, default_reach, found_joint, gap_in, rims_of
@@ -82,14 +83,14 @@ class JoinTool(TwoPartTool):
             return bool(self.parts)
         return True
 
-    def _take_selection(self, surface: Surface, selection: np.ndarray) -> None:
+    def _take_selection(self, surface: Surface, selection: FileMask) -> None:
         """Take the rims of the gap between the selection and the rest as the two parts."""
         self.context.hud.show(text=self.looking)
 
-        def make(job: Job) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        def make(job: Job) -> tuple[tuple[FileRow, ...], tuple[FileRow, ...]]:
             return rims_of(surface, selection)
 
-        def take(rims: tuple[tuple[int, ...], tuple[int, ...]]) -> None:
+        def take(rims: tuple[tuple[FileRow, ...], tuple[FileRow, ...]]) -> None:
             scene = self.context.session.scene
             if scene is not None and scene.surface is surface and not self.parts:
                 super(JoinTool, self).take_rows(*rims)

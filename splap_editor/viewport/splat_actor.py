@@ -155,11 +155,11 @@ class _Cloud:
             self.vtk_points.Modified()
         self._poly.Modified()
 
-    def draw(self, places: NDArray[np.integer]) -> None:
+    def draw(self, order: RowsByPlace) -> None:
         """Draw these points, in this order."""
         # One poly-vertex cell with all points: VTK walks through cells one by one, through ids fast.
-        self._places = np.ascontiguousarray(places, np.int32)
-        self._ends = np.array([0, len(places)], np.int32)
+        self._places = np.ascontiguousarray(order, np.int32)
+        self._ends = np.array([0, len(order)], np.int32)
         cells = vtkCellArray()
         cells.SetData(numpy_to_vtk(self._ends, array_type=VTK_INT), numpy_to_vtk(self._places, array_type=VTK_INT))
         self._poly.SetVerts(cells)

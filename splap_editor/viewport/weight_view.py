@@ -41,7 +41,7 @@ class WeightView:
         self._paint = paint
         self._is_on = False
         self._painted: tuple[object, int] | None = None
-        self._nodes: tuple[Region | None, NDArray[np.float64]] = (None, np.empty((0, 3)))
+        self._node_points: tuple[Region | None, NDArray[np.float64]] = (None, np.empty((0, 3)))
         SceneFollower(
             session,
             self._on_scene_changed,
@@ -66,7 +66,7 @@ class WeightView:
         self._show_cage(radius)
 
     def _on_scene_changed(self) -> None:
-        self._nodes = (None, np.empty((0, 3)))
+        self._node_points = (None, np.empty((0, 3)))
         self._painted = None
         self._show()
 
@@ -129,7 +129,7 @@ class WeightView:
         self._viewport.request_render()
 
     def _nodes_of(self, scene: Scene, handle: Handle) -> NDArray[np.float64]:
-        if self._nodes[0] is not handle.region:
+        if self._node_points[0] is not handle.region:
             nodes = handle_nodes(scene.ellipses, [handle.region]).indices
-            self._nodes = (handle.region, scene.ellipses.centers[nodes])
-        return self._nodes[1]
+            self._node_points = (handle.region, scene.ellipses.centers[nodes])
+        return self._node_points[1]

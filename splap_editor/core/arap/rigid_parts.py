@@ -7,6 +7,7 @@ from scipy.spatial import cKDTree
 from splap_editor.core.arap.problem import Constraints, Pose
 from splap_editor.core.arap.rotation_fit import nearest_rotations
 from splap_editor.core.deformer import PIN
+from splap_editor.core.index_spaces import Nodes
 
 _ANCHORS = 16
 """At most so many neighbouring nodes tell a loose part how to move."""
@@ -32,7 +33,7 @@ class LooseParts:
 
     def __init__(self, rest: NDArray[np.float64], constraints: Constraints) -> None:
         loose = constraints.loose
-        self.nodes: NDArray[np.int64] = np.flatnonzero(loose)
+        self.nodes: Nodes = np.flatnonzero(loose)
         self._rest = rest
         if len(self.nodes) == 0:
             return

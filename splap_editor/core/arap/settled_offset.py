@@ -5,6 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.arap.problem import Pose
+from splap_editor.core.index_spaces import Nodes
 
 
 class SettledOffset:
@@ -28,7 +29,7 @@ class SettledOffset:
     def __init__(
         self,
         rest: NDArray[np.float64],
-        nodes: NDArray[np.int64],
+        nodes: Nodes,
         coarse: Pose,
         settled: Pose,
         transforms: NDArray[np.float64],

@@ -34,7 +34,7 @@ def blended_linear(
         a joint twisted by half a turn.
     """
     displacements = np.ascontiguousarray(transforms[:, :3] - np.eye(3, 4))
-    return _linear(np.ascontiguousarray(rest), *_rows(weights), displacements, _turns(transforms[:, :3, :3]))
+    return _linear(np.ascontiguousarray(rest), *_csr_parts(weights), displacements, _turns(transforms[:, :3, :3]))
 
 
 def blended_dual_quaternion(
@@ -85,11 +85,11 @@ def blended_dual_quaternion(
     agree = bool((quats @ quats.T >= 0).all())
     rest = np.ascontiguousarray(rest)
     return _dual_quaternion(
-        rest, *_rows(weights), np.hstack([quats, duals]), agree, excess, offsets, bool(excess.any())
+        rest, *_csr_parts(weights), np.hstack([quats, duals]), agree, excess, offsets, bool(excess.any())
     )
 
 
-def _rows(weights: sp.csr_array) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float64]]:
+def _csr_parts(weights: sp.csr_array) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float64]]:
     indptr, indices = weights.indptr.astype(np.int32, copy=False), weights.indices.astype(np.int32, copy=False)
     return indptr, indices, weights.data.astype(np.float64, copy=False)
 

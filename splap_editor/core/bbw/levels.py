@@ -7,6 +7,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from splap_editor.core.index_spaces import Nodes
 from splap_editor.core.surface.shortest_paths import settle
 
 
@@ -31,7 +32,7 @@ class Level:
     points: NDArray[np.float64]
     L: sp.csr_array
     M: NDArray[np.float64]
-    nodes: NDArray[np.int64]
+    nodes: Nodes
     cells: NDArray[np.int64]
 
     @property

@@ -13,6 +13,7 @@ from splap_editor.core.bbw.box_qp import BoxQpReport, box_qp
 from splap_editor.core.bbw.levels import Level, coarser_level, prolonged
 from splap_editor.core.bbw.options import BbwOptions
 from splap_editor.core.deformer import FREE, Handles
+from splap_editor.core.index_spaces import Nodes
 from splap_editor.core.progress import Progress, no_progress, part_of
 
 CHEAP_UNKNOWNS = 10_000
@@ -78,7 +79,7 @@ class HandleWeight:
         Time spent.
     """
 
-    nodes: NDArray[np.int64]
+    nodes: Nodes
     values: NDArray[np.float64]
     qp: BoxQpReport
     n_unknowns: int

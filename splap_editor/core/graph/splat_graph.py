@@ -12,6 +12,7 @@ from splap_editor.core.graph.ellipse_offset import touch_scales
 from splap_editor.core.graph.ellipse_tree import ellipse_tree
 from splap_editor.core.graph.options import GRAPH_RULES, GraphOptions
 from splap_editor.core.graph.touch_rule import edge_keys, labels_by_size
+from splap_editor.core.index_spaces import FileRows, RowPair
 from splap_editor.core.progress import Progress, no_progress
 from splap_editor.core.splats.occupancy import Ellipses
 
@@ -171,7 +172,7 @@ def _mended(
     return edges, touch
 
 
-def _node_pairs(ellipses: Ellipses, rows: tuple[tuple[int, int], ...], name: str) -> NDArray[np.int32]:
+def _node_pairs(ellipses: Ellipses, rows: tuple[RowPair, ...], name: str) -> NDArray[np.int32]:
     """(E, 2) nodes of pairs of file rows."""
     pairs = np.array(rows, np.int64).reshape(-1, 2)
     flat = pairs.ravel()
@@ -187,7 +188,7 @@ def _node_pairs(ellipses: Ellipses, rows: tuple[tuple[int, int], ...], name: str
     return np.sort(nodes, axis=1).astype(np.int32)
 
 
-def _listed(rows: NDArray[np.int64]) -> str:
+def _listed(rows: FileRows) -> str:
     rows = np.unique(rows)
     return ", ".join(map(str, rows[:5])) + (f" and {len(rows) - 5} more" if len(rows) > 5 else "")
 

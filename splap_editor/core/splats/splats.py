@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.index_spaces import FileMask
+
 
 @dataclass(frozen=True, eq=False)
 class Splats:
@@ -86,7 +88,7 @@ class Splats:
         middle, high = np.percentile(ratios, (50, 95))
         return bool(middle < 0.1 and high < 0.5)
 
-    def at(self, rows: NDArray[np.bool_]) -> "Splats":
+    def at(self, rows: FileMask) -> "Splats":
         """Splats of some rows, by a mask (N,), as copies."""
         held: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
         taken: dict[str, Any] = {name: part[rows] for name, part in held.items() if isinstance(part, np.ndarray)}

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.graph.splat_graph import SplatGraph
+from splap_editor.core.index_spaces import Nodes
 from splap_editor.core.progress import Progress, no_progress
 from splap_editor.core.surface.shortest_paths import heap_add, settle
 
@@ -40,7 +41,7 @@ class Neighborhoods:
 
 
 def geodesic_neighbors(
-    graph: SplatGraph, k: int = 30, *, nodes: NDArray[np.integer] | None = None, progress: Progress = no_progress
+    graph: SplatGraph, k: int = 30, *, nodes: Nodes | None = None, progress: Progress = no_progress
 ) -> Neighborhoods:
     """Find the k nearest nodes of every node by shortest path.
 
@@ -87,7 +88,7 @@ def geodesic_neighbors(
     return Neighborhoods(indptr, np.concatenate(indices), np.concatenate(distances))
 
 
-def node_runs(n_nodes: int, nodes: NDArray[np.integer] | None, most: int) -> Iterator[tuple[int, int]]:
+def node_runs(n_nodes: int, nodes: Nodes | None, most: int) -> Iterator[tuple[int, int]]:
     """Part nodes into runs without a gap, as pairs of first and last + 1.
 
     Parameters

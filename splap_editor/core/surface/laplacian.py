@@ -8,6 +8,7 @@ from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
 
 from splap_editor.core.graph.options import LAPLACIANS
 from splap_editor.core.graph.splat_graph import SplatGraph
+from splap_editor.core.index_spaces import Nodes
 
 BRIDGE_WEIGHT = 0.5
 """Weight of a graph edge that stands in for triangles; about the cotangent weight 0.58 of an equilateral mesh."""
@@ -85,7 +86,7 @@ def mended_star_laplacian(
     centers: NDArray[np.float64],
     triangles: NDArray[np.integer],
     graph: SplatGraph,
-    nodes: NDArray[np.integer],
+    nodes: Nodes,
     triangles_before: NDArray[np.integer],
     L_before: sp.csr_array,
     M_before: NDArray[np.float64],

@@ -4,6 +4,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.index_spaces import Nodes
 from splap_editor.core.progress import Progress, no_progress
 from splap_editor.core.splats.occupancy import Ellipses
 from splap_editor.core.surface.geodesics import Neighborhoods, node_runs
@@ -19,7 +20,7 @@ def local_triangulations(
     ellipses: Ellipses,
     neighborhoods: Neighborhoods,
     *,
-    nodes: NDArray[np.integer] | None = None,
+    nodes: Nodes | None = None,
     progress: Progress = no_progress,
 ) -> NDArray[np.int32]:
     """Triangles around each node, among its geodesic neighbours.
@@ -65,7 +66,7 @@ def local_triangulations(
 
 
 def mended_triangulations(
-    ellipses: Ellipses, neighborhoods: Neighborhoods, before: NDArray[np.int32], nodes: NDArray[np.integer]
+    ellipses: Ellipses, neighborhoods: Neighborhoods, before: NDArray[np.int32], nodes: Nodes
 ) -> NDArray[np.int32]:
     """Bring the stars of some nodes up to date: what `local_triangulations` gives.
 

@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from splap_editor.core.graph.splat_graph import SplatGraph
+from splap_editor.core.index_spaces import Node
 from splap_editor.core.progress import Progress
 from splap_editor.core.splats.occupancy import Ellipses
 from splap_editor.core.surface.geodesics import Neighborhoods, geodesic_neighbors
@@ -85,14 +86,14 @@ def nearest_by_mahalanobis(ellipses: Ellipses, graph: SplatGraph, k: int, progre
     return _in_rows(near, far, n)
 
 
-def mahalanobis_frame(ellipses: Ellipses, node: int) -> NDArray[np.float64]:
+def mahalanobis_frame(ellipses: Ellipses, node: Node) -> NDArray[np.float64]:
     """(3, 3) matrix that takes a step in world units to one in units of a node's ellipse, its thickness a tenth."""
     major, minor = ellipses.semi_axes[node]
     length = np.linalg.norm(minor)
     return np.stack([major / (major @ major), minor / length**2, ellipses.normals[node] / (NORMAL_SHARE * length)])
 
 
-def _mahalanobis(ellipses: Ellipses, node: int, others: NDArray[np.int64]) -> NDArray[np.float64]:
+def _mahalanobis(ellipses: Ellipses, node: Node, others: NDArray[np.int64]) -> NDArray[np.float64]:
     steps = (ellipses.centers[others] - ellipses.centers[node]) @ mahalanobis_frame(ellipses, node).T
     return np.linalg.norm(steps, axis=1)
 
