@@ -123,7 +123,7 @@ class Finder:
         if isinstance(picked, PickedFloaters):
             from splap_editor.engine.floaters import floating_rows
 
-            return floating_rows(self._splats, removed, picked.strength, stages=self._stages, alone=self._alone)
+            return floating_rows(self._splats, removed, picked.strength, stages=self._stages)
         assert isinstance(picked, PickedRange)
         values = rest_values(picked.quantity, self._splats, removed, stages=self._stages, alone=self._alone)
         with np.errstate(invalid="ignore"):

@@ -4,20 +4,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from splap_editor.core.graph.options import GraphOptions
-from splap_editor.core.graph.splat_graph import SplatGraph, splat_graph
 from splap_editor.core.index_spaces import FileMask, FileRow, FileRows
-from splap_editor.core.progress import Guard, StageProgress, silent, unguarded
+from splap_editor.core.progress import StageProgress, silent
 from splap_editor.core.removal import PickedFloaters, RemovalStep
 from splap_editor.core.splats.floaters import Floaters
 from splap_editor.core.splats.occupancy import Ellipses, occupancy_ellipses
 from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.floaters import scene_floaters
 from splap_editor.engine.removal import Removal
-from splap_editor.engine.surface import Surface
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,22 +24,19 @@ class FloaterSearch:
     ----------
     ellipses : Ellipses
         Of those splats.
-    touching : (n, n) csr_array
-        Their graph.
     floaters : Floaters
     before : Removal
         What was removed when they were looked at.
     """
 
     ellipses: Ellipses
-    touching: csr_array
     floaters: Floaters
     before: Removal
 
     def found(self, strength: float) -> "FoundFloaters":
         """What floats at a strength, and what of it hangs together."""
         nodes = np.flatnonzero(self.floaters.at(strength))
-        labels = connected_components(self.touching[nodes][:, nodes], directed=False)[1]
+        labels = connected_components(self.floaters.touching[nodes][:, nodes], directed=False)[1]
         return FoundFloaters(self.ellipses.rows[nodes], labels, self.ellipses.n_splats)
 
     def removal(self, strength: float) -> Removal:
@@ -94,14 +87,7 @@ class FoundFloaters:
         return int(self.labels[at[0]]) if len(at) else None
 
 
-def floater_search(
-    splats: Splats,
-    removal: Removal,
-    surface: Surface | None,
-    *,
-    stages: StageProgress = silent,
-    alone: Guard = unguarded,
-) -> FloaterSearch:
+def floater_search(splats: Splats, removal: Removal, *, stages: StageProgress = silent) -> FloaterSearch:
     """Look at the splats that are left, as `splap_editor.engine.floaters.floating_rows` does for a recipe.
 
     Parameters
@@ -110,32 +96,8 @@ def floater_search(
         All of the file's.
     removal : Removal
         What is left out already.
-    surface : Surface, optional
-        Its graph is taken where it is the one that a recipe would make.
     stages : callable
         ``stages(name)`` gives the progress callback of a stage.
-    alone : callable
-        ``alone(progress)`` is entered around a graph search.
     """
-    graph: SplatGraph | None = None
-    if (
-        surface is not None
-        and surface.options == GraphOptions()
-        and surface.ellipses is surface.visible
-        and _leaves_out(surface, removal)
-    ):
-        ellipses, graph = surface.ellipses, surface.graph
-    else:
-        ellipses = occupancy_ellipses(splats, removed=removal.mask)
-    if graph is None:
-        with alone(stages("graph")):
-            graph = splat_graph(ellipses, GraphOptions(), progress=stages("graph"))
-    return FloaterSearch(ellipses, graph.matrix(), scene_floaters(splats, ellipses, graph, stages=stages), removal)
-
-
-def _leaves_out(surface: Surface, removal: Removal) -> bool:
-    """Whether a surface was made without the splats of a removal, and with all others."""
-    removed = surface.ellipses.removed
-    if removed is None or removal.mask is None:
-        return removed is None and removal.mask is None
-    return np.array_equal(removed, removal.mask)
+    ellipses = occupancy_ellipses(splats, removed=removal.mask)
+    return FloaterSearch(ellipses, scene_floaters(splats, ellipses, stages=stages), removal)

@@ -11,7 +11,6 @@ from splap_editor.session.floater_search import FloaterSearch, FoundFloaters, fl
 from splap_editor.session.jobs import Job
 from splap_editor.session.latest_job import LatestJob
 from splap_editor.session.scene_follower import SceneFollower
-from splap_editor.session.side_by_side import alone
 from splap_editor.tools.bindings import Binding
 from splap_editor.tools.crop_tool import GOES_TINT
 from splap_editor.tools.tool import KeyEvent, PointerEvent, Tool, ToolContext
@@ -60,7 +59,7 @@ class FloatersTool(Tool):
         """Look for floaters among what is left."""
         session = self.context.session
         scene = session.shown_scene
-        splats, removal, surface = scene.splats, scene.edit.removal, scene.surface
+        splats, removal = scene.splats, scene.edit.removal
         self._is_asked = True
         self.context.hud.show(text="Looking for floaters …")
 
@@ -72,7 +71,7 @@ class FloatersTool(Tool):
 
                 return progress
 
-            return floater_search(splats, removal, surface, stages=stages, alone=alone)
+            return floater_search(splats, removal, stages=stages)
 
         def take(search: FloaterSearch) -> None:
             if session.scene is scene and scene.edit.removal is removal and self._is_asked:
@@ -137,7 +136,7 @@ class FloatersTool(Tool):
 
     def _tell(self, stage: str, share: float) -> None:
         if self._is_asked:
-            words = "connecting splats" if stage == "graph" else "seeing which splats make the picture"
+            words = "weighing what is known of each" if stage == "floaters" else "seeing which splats make the picture"
             self.context.hud.show(text=f"Looking for floaters – {words}, {share:.0%}")
 
     def _on_failed(self, error: Exception) -> None:

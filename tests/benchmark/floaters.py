@@ -2,42 +2,56 @@
 
 ::
 
-    python -m tests.benchmark.floaters                       # bundled samples with made floaters
-    python -m tests.benchmark.floaters --captures FOLDER     # and on every PLY of a folder
-    python -m tests.benchmark.floaters --fit                 # print the model's weights, fitted on half of the scenes
+    python -m tests.benchmark.floaters                       # objects, kinds and seeds that nothing was fitted on
+    python -m tests.benchmark.floaters --captures FOLDER     # the captures of a folder among them, and as they are
+    python -m tests.benchmark.floaters --fit                 # print the numbers of core/splats/floater_weights.py
 """
 
 import argparse
+from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from time import perf_counter
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from splap_editor.core.graph.options import GraphOptions
-from splap_editor.core.graph.splat_graph import splat_graph
-from splap_editor.core.splats.contributions import contributions
-from splap_editor.core.splats.floaters import Floaters, floaters, model_terms
+from splap_editor.core.splats.floater_evidence import EVIDENCE
+from splap_editor.core.splats.floaters import Floaters
 from splap_editor.core.splats.main_subject import main_subject
 from splap_editor.core.splats.occupancy import Ellipses, occupancy_ellipses
 from splap_editor.core.splats.splats import Splats
+from splap_editor.engine.floaters import scene_floaters
 from splap_editor.io.ply import read_ply
+from splap_editor.io.sample_maker import STYLES, shape_sample, surface_splats
 from splap_editor.resources import resource
+from tests.benchmark.floater_scenes import KINDS
+from tests.benchmark.paper_objects import made_object
 
-SAMPLES = ("bench_2dgs", "windmill_2dgs", "tube", "coil")
 STRENGTH = 0.5
-FITTED, HELD_OUT = (0, 1), (2, 3, 7, 11, 12, 13)
-"""Seeds of the floaters; odd ones have one half of the object nine times sparser than the other."""
+
+CAUTION = 1.5
+"""How much surer than even it must be that a splat floats (logit): losing a part is worse than leaving some haze."""
+
+FITTED = (
+    "bench_2dgs",
+    *("bench thin", "bench trained", "birdcage trained", "cheese thin", "book trained", "figure thin"),
+    *("figure trained", "folded_sheet thin", "comb trained", "coil thin", "slats trained"),
+)
+HELD_OUT = (
+    *("windmill_2dgs", "tube", "coil", "two_sheets trained", "harp thin", "ferris wheel trained", "fence thin"),
+    *("headphone trained", "basket trained", "bed thin"),
+)
+"""Objects, no shape in both: bundled samples by their file, made ones by shape or category and style."""
+
+_CATEGORIES = ("harp", "ferris wheel", "fence", "headphone", "basket", "bed")
+_FIRST_SEED = {FITTED: 100, HELD_OUT: 900}
 
 
 def with_floaters(splats: Splats, seed: int) -> tuple[Splats, NDArray[np.bool_]]:
     """Add haze, clumps and far specks to a clean scene; also says which splats they are, inert ones left out."""
     rng = np.random.default_rng(seed)
-    if seed % 2:
-        splats = with_sparse_half(splats, rng)
     means = np.asarray(splats.means, np.float64)
     subject = main_subject(means, splats.opacities)
     s, usual = subject.size, np.median(np.asarray(splats.log_scales, np.float64)[:, :2])
@@ -70,15 +84,6 @@ def with_floaters(splats: Splats, seed: int) -> tuple[Splats, NDArray[np.bool_]]
     return replace(splats, **parts), np.arange(n + len(added)) >= n
 
 
-def with_sparse_half(splats: Splats, rng: np.random.Generator) -> Splats:
-    """A scene one half of which has a ninth of its splats, three times as large: captures are not equally dense."""
-    means = np.asarray(splats.means, np.float64)
-    side = (means - np.median(means, axis=0)) @ rng.normal(size=3) > 0.0
-    kept = ~side | (rng.random(len(means)) < 1.0 / 9.0)
-    log_scales = np.asarray(splats.log_scales, np.float64) + np.log(3.0) * side[:, None]
-    return replace(splats, log_scales=log_scales).at(kept)
-
-
 def _off(rng, means, subject, n, reach, least):
     """(n, 3) places about the subject, none of them nearer to it than ``least``."""
     from scipy.spatial import cKDTree
@@ -95,91 +100,110 @@ def _logit(opacity):
     return np.log(opacity / (1.0 - opacity))
 
 
-def found_in(splats: Splats) -> tuple[Ellipses, Floaters, float]:
-    """Floaters of a scene, and the seconds that finding them took once there is a graph."""
+def found_in(splats: Splats) -> tuple[Ellipses, Floaters]:
+    """Floaters of a scene."""
     ellipses = occupancy_ellipses(splats)
-    graph = splat_graph(ellipses, GraphOptions())
-    start = perf_counter()
-    made = floaters(splats, ellipses, graph.matrix(), contributions(splats, ellipses))
-    return ellipses, made, perf_counter() - start
+    return ellipses, scene_floaters(splats, ellipses)
 
 
-def made_scenes(folder: Path | None) -> Iterator[tuple[str, int, Splats, NDArray[np.bool_]]]:
-    """Objects, thin and trained, with each seed's floaters."""
-    paths = [resource("samples", f"{name}.ply") for name in SAMPLES]
-    if folder is not None:
-        paths += sorted(folder.glob("*_3dgs.ply"))
-    for path in paths:
-        clean = read_ply(path).splats
-        for seed in (*FITTED, *HELD_OUT):
-            yield path.stem, seed, *with_floaters(clean, seed)
+def clean_object(name: str) -> Splats:
+    """An object without floaters, but for a trained one's own haze."""
+    if name.endswith("_2dgs") or " " not in name:
+        return read_ply(resource("samples", f"{name}.ply")).splats
+    shape, style = name.rsplit(" ", 1)
+    if shape in _CATEGORIES:
+        return surface_splats(made_object(shape, 5).surface, 9000, STYLES[style], seed=5).splats
+    return shape_sample(shape, 9000 if style == "thin" else 12_000, STYLES[style], seed=3).splats
 
 
-def fitted(evidence: NDArray[np.float64], is_floater: NDArray[np.bool_], weight: NDArray[np.float64]):
-    """Weights of the logistic model, with a small penalty on their squares."""
-    terms, sign = model_terms(evidence), np.where(is_floater, 1.0, -1.0)
+def made_scenes(names: tuple[str, ...], folder: Path | None) -> Iterator[tuple[str, str, Splats, NDArray[np.bool_]]]:
+    """Each object in each kind of scene, with floaters of its own."""
+    objects = {name: clean_object(name) for name in names}
+    for path in sorted(folder.glob("*_3dgs.ply")) if folder is not None else ():
+        objects[path.stem] = read_ply(path).splats
+    for number, (name, clean) in enumerate(objects.items()):
+        for place, (kind, made) in enumerate(KINDS.items()):
+            seed = _FIRST_SEED[names] + 2 * (17 * number + place)
+            yield name, kind, *with_floaters(made(clean, np.random.default_rng(seed)), seed)
+
+
+def fitted_model(scenes: list[tuple[NDArray[np.float64], NDArray[np.bool_]]]) -> tuple[NDArray[np.float64], ...]:
+    """Centres, spreads and weights of the logistic model: every scene counts alike, its floaters for a quarter."""
+    rng = np.random.default_rng(3)
+    parts = []
+    for evidence, truth in scenes:
+        for is_floater, share, most in ((False, 0.75, 533), (True, 0.25, 266)):
+            rows = np.flatnonzero(truth == is_floater)
+            rows = rng.choice(rows, min(len(rows), most), replace=False)
+            parts.append((evidence[rows], truth[rows], np.full(len(rows), share / len(rows))))
+    x, truth, weight = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    weight /= weight.sum()
+    centers = weight @ x
+    spreads = np.sqrt(weight @ (x - centers) ** 2) + 1e-6
+    standard = np.clip((x - centers) / spreads, -3.0, 3.0)
+    i, j = np.triu_indices(x.shape[1])
+    terms, sign = np.column_stack([np.ones(len(x)), standard, standard[:, i] * standard[:, j]]), 2.0 * truth - 1.0
 
     def loss(w):
         margin = sign * (terms @ w)
-        lost = np.logaddexp(0.0, -margin)
         slope = -weight * sign * np.exp(-np.logaddexp(0.0, margin))
-        total = weight.sum()
-        return weight @ lost / total + 1e-4 * w @ w, terms.T @ slope / total + 2e-4 * w
+        penalized = np.concatenate([[0.0], w[1:]])
+        return weight @ np.logaddexp(0.0, -margin) + 1e-4 * w @ penalized, terms.T @ slope + 2e-4 * penalized
 
-    return minimize(loss, np.zeros(terms.shape[1]), jac=True, method="L-BFGS-B", options={"maxiter": 500}).x
+    start = np.zeros(terms.shape[1])
+    w = minimize(loss, start, jac=True, method="L-BFGS-B", options={"maxiter": 300}).x
+    w[0] -= CAUTION
+    return centers, spreads, w
 
 
 def main() -> None:
-    """Print a line for each scene."""
+    """Print a line for each scene, or the fitted model."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--fit", action="store_true", help="fit the model on the seeds for it")
+    parser.add_argument("--fit", action="store_true", help="fit the model on the objects for it")
     parser.add_argument("--captures", type=Path, metavar="FOLDER", help="captures to find floaters in as they are")
     options = parser.parse_args()
-    known = []
-    for name, seed, splats, is_floater in made_scenes(options.captures):
-        ellipses, made, seconds = found_in(splats)
-        truth = is_floater[ellipses.rows]
-        known.append((name, seed, made, truth))
-        _tell(f"{name} {seed}", made.at(STRENGTH), truth, seconds)
-    _tell_means(known)
     if options.fit:
-        pairs = [(made.evidence, truth) for _, seed, made, truth in known if seed in FITTED]
-        # Every scene counts alike, and so do its floaters and what is none.
-        weight = np.concatenate([np.where(t, 0.2 / t.sum(), 0.8 / (~t).sum()) for _, t in pairs])
-        w = fitted(np.concatenate([e for e, _ in pairs]), np.concatenate([t for _, t in pairs]), weight)
-        print("WEIGHTS = (" + ", ".join(f"{value:.3f}" for value in w) + ")")
-        for name, seed, made, truth in known:
-            _tell(f"fitted {name} {seed}", model_terms(made.evidence) @ w > 0.0, truth, 0.0)
+        scenes = []
+        for _, _, splats, is_floater in made_scenes(FITTED, None):
+            ellipses, found = found_in(splats)
+            scenes.append((found.evidence, is_floater[ellipses.rows]))
+        _tell_model(*fitted_model(scenes))
+        return
+    known = defaultdict(list)
+    for name, kind, splats, is_floater in made_scenes(HELD_OUT, options.captures):
+        ellipses, made = found_in(splats)
+        found, truth = made.at(STRENGTH), is_floater[ellipses.rows]
+        hits = (found & truth).sum()
+        told = hits / max(found.sum(), 1), hits / truth.sum(), (found & ~truth).sum() / (~truth).sum()
+        _tell(f"{name}, {kind}", [told])
+        known[kind].append(told)
+    for kind, told in known.items():
+        _tell(kind, told)
+    _tell("all", [one for told in known.values() for one in told])
     for path in sorted(options.captures.glob("*.ply")) if options.captures is not None else []:
         splats = read_ply(path).splats
-        ellipses, made, seconds = found_in(splats)
-        left = np.ones(splats.n_splats, bool)
-        left[ellipses.rows[made.at(STRENGTH)]] = False
-        cleaned = occupancy_ellipses(splats, removed=~left)
+        ellipses, made = found_in(splats)
+        removed = np.zeros(splats.n_splats, bool)
+        removed[ellipses.rows[made.at(STRENGTH)]] = True
+        sizes = ellipses.scene_scale, occupancy_ellipses(splats, removed=removed).scene_scale
         share = 100 * made.at(STRENGTH).mean()
-        sizes = f"size {ellipses.scene_scale:.3g} → {cleaned.scene_scale:.3g}"
-        print(f"{path.name}: {share:.1f} % of {len(ellipses.rows)}; {sizes}; {seconds:.2f} s")
+        print(f"{path.name}: {share:.1f} % of {len(ellipses.rows)}; size {sizes[0]:.3g} → {sizes[1]:.3g}")
 
 
-def _tell_means(known: list[tuple[str, int, Floaters, NDArray[np.bool_]]]) -> None:
-    """Print means over what was not fitted, evenly dense objects and others apart."""
-    for odd, words in ((0, "evenly dense"), (1, "one half sparser")):
-        pairs = [(made.at(STRENGTH), truth) for _, seed, made, truth in known if seed in HELD_OUT and seed % 2 == odd]
-        precisions = [(found & truth).sum() / max(found.sum(), 1) for found, truth in pairs]
-        recalls = [(found & truth).sum() / truth.sum() for found, truth in pairs]
-        print(
-            f"held out, {words}: {len(pairs)} scenes, mean precision {np.mean(precisions):.3f}, recall "
-            f"{np.mean(recalls):.3f}; worst {min(precisions):.3f}, {min(recalls):.3f}"
-        )
-
-
-def _tell(name: str, found: NDArray[np.bool_], truth: NDArray[np.bool_], seconds: float) -> None:
-    hits = (found & truth).sum()
+def _tell(name: str, told: list[tuple[float, float, float]]) -> None:
+    precision, recall, lost = np.array(told).T
     print(
-        f"{name}: precision {hits / max(found.sum(), 1):.3f}, recall {hits / truth.sum():.3f}, "
-        f"{truth.sum()} of {len(truth)} float; {seconds:.2f} s",
+        f"{name}: {len(told)} scenes, precision {precision.mean():.3f} (worst {precision.min():.3f}), recall "
+        f"{recall.mean():.3f} ({recall.min():.3f}), of the object {100 * lost.mean():.2f} % ({100 * lost.max():.1f} %)",
         flush=True,
     )
+
+
+def _tell_model(*model: NDArray[np.float64]) -> None:
+    """Print the module of weights, ready for `ruff format`."""
+    assert len(model[0]) == len(EVIDENCE)
+    for name, values in zip(("CENTERS", "SPREADS", "WEIGHTS"), model, strict=True):
+        print(f"{name} = (" + ", ".join(f"{value:.3f}" for value in values) + ")")
 
 
 if __name__ == "__main__":

@@ -114,4 +114,4 @@ def test_a_session_with_floaters_tells_how_far_it_is(session, tmp_path):
     scene = type(session.scene)(session.scene.file, session.scene.ellipses)
     restore_scene(scene, kept, Finder(scene.splats, stages=stages))
     np.testing.assert_array_equal(scene.removed, session.scene.removed)
-    assert {stage for stage, _ in told} == {"graph", "contributions"}
+    assert {stage for stage, _ in told} == {"contributions", "floaters"}

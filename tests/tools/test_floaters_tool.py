@@ -24,14 +24,14 @@ def looked_for(hand, strength):
 def some_strength(hand):
     """A strength at which some of the splats float, but not all."""
     scene = hand.scene
-    search = floater_search(scene.splats, scene.edit.removal, scene.surface)
+    search = floater_search(scene.splats, scene.edit.removal)
     likelihoods = np.sort(search.floaters.likelihoods)[::-1]
     return float(np.clip(1.0 - likelihoods[len(likelihoods) // 20], 0.01, 0.99999))
 
 
 def test_the_window_finds_what_a_recipe_finds(hand):
     scene, strength = hand.scene, some_strength(hand)
-    search = floater_search(scene.splats, Removal(), scene.surface)
+    search = floater_search(scene.splats, Removal())
     found = search.found(strength)
     np.testing.assert_array_equal(found.mask, floating_rows(scene.splats, None, strength))
     assert 0 < len(found.rows) < scene.splats.n_splats
@@ -39,7 +39,7 @@ def test_the_window_finds_what_a_recipe_finds(hand):
     assert sizes == sorted(sizes, reverse=True) and sum(sizes) == len(found.rows)
     assert found.group_of(int(found.rows[0])) == found.labels[0]
     removed = search.removal(strength)
-    again = floater_search(scene.splats, removed, scene.surface)
+    again = floater_search(scene.splats, removed)
     assert not again.found(0.0).mask.any()
     assert again.ellipses.n_nodes == scene.ellipses.n_nodes - len(found.rows)
 
@@ -90,11 +90,11 @@ def test_it_says_how_far_it_is(hand):
 def test_another_tool_stops_the_looking(hand, monkeypatch):
     begun, go_on, ended = threading.Event(), threading.Event(), []
 
-    def slow(splats, removal, surface, *, stages, alone):
+    def slow(splats, removal, *, stages):
         begun.set()
         go_on.wait(60.0)
         try:
-            stages("graph")(0.5)
+            stages("contributions")(0.5)
         except Cancelled:
             ended.append("cancelled")
             raise

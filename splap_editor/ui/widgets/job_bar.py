@@ -16,6 +16,7 @@ STAGES = {
     "occupancy": "measuring splats",
     "graph": "connecting splats",
     "contributions": "seeing which splats make the picture",
+    "floaters": "weighing what floats",
     "geodesics": "measuring along the surface",
     "laplacian": "weighing neighbours",
     "kernels": "attaching splats",

@@ -5,16 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from splap_editor.core.graph.options import GraphOptions
-from splap_editor.core.graph.splat_graph import splat_graph
 from splap_editor.core.place import Place, placed_splats
+from splap_editor.core.splats import floater_evidence
 from splap_editor.core.splats.contributions import contributions
 from splap_editor.core.splats.floaters import floaters
 from splap_editor.core.splats.occupancy import occupancy_ellipses
 from splap_editor.core.splats.splats import Splats
 from splap_editor.io.ply import read_ply
 from splap_editor.resources import resource
+from tests.benchmark.floater_scenes import KINDS
 from tests.benchmark.floaters import with_floaters
+from tests.reference.floater_evidence import local_evidence
 
 PLACE = Place(rotate=(0.8, 0.0, 0.6, 0.0), translate=(1.0, 2.0, 3.0), scale=2.0)
 
@@ -22,8 +23,7 @@ PLACE = Place(rotate=(0.8, 0.0, 0.6, 0.0), translate=(1.0, 2.0, 3.0), scale=2.0)
 def likelihoods(splats):
     """(N,) of every file row, 0 for inert ones."""
     ellipses = occupancy_ellipses(splats)
-    graph = splat_graph(ellipses, GraphOptions())
-    made = floaters(splats, ellipses, graph.matrix(), contributions(splats, ellipses))
+    made = floaters(ellipses, contributions(splats, ellipses))
     held = np.zeros(splats.n_splats)
     held[ellipses.rows] = made.likelihoods
     return held, made, ellipses
@@ -43,6 +43,36 @@ def test_known_floaters_are_found_and_little_else(scene):
     hits = (found & is_floater).sum()
     assert hits >= 0.95 * is_floater.sum()
     assert hits >= 0.95 * found.sum()
+
+
+def test_what_is_known_of_a_splat_among_its_nearest_is_as_the_slow_twin_says(scene):
+    splats, _ = scene
+    removed = np.ones(splats.n_splats, bool)
+    removed[:: splats.n_splats // 150] = False
+    ellipses = occupancy_ellipses(splats, removed=removed)
+    neighbors, distances = floater_evidence.nearest(ellipses.centers)
+    ways = np.linalg.norm(ellipses.centers[:, None] - ellipses.centers, axis=2)
+    np.testing.assert_allclose(distances, np.sort(ways, axis=1)[:, 1 : 1 + floater_evidence.N_NEAREST])
+    assert not (neighbors == np.arange(ellipses.n_nodes)[:, None]).any()
+    logits, strays = np.log(ellipses.opacities / (1.0001 - ellipses.opacities)), floater_evidence._STRAY
+    found, ties = np.empty((len(neighbors), 9)), np.zeros((2, *neighbors.shape), bool)
+    shapes = ellipses.centers, ellipses.semi_axes, ellipses.normals, ellipses.reaches
+    floater_evidence._local(neighbors, distances, *shapes, logits, np.array(strays), found, ties)
+    slow, slow_ties = local_evidence(neighbors, distances, ellipses, logits, floater_evidence._THICKNESS, strays)
+    np.testing.assert_allclose(found, slow, atol=1e-9)
+    np.testing.assert_array_equal(ties, slow_ties)
+    assert ties.any() and not ties.all()
+
+
+@pytest.mark.parametrize("kind", ["half 9 times sparser", "half transparent", "two objects", "thin bars"])
+def test_no_part_of_an_object_is_taken_for_floaters(kind):
+    clean = read_ply(resource("samples", "tube.ply")).splats
+    splats, is_floater = with_floaters(KINDS[kind](clean, np.random.default_rng(5)), seed=5)
+    held, _, ellipses = likelihoods(splats)
+    is_floater = is_floater & (ellipses.node_of_row >= 0)
+    found = held > 0.5
+    assert (found & ~is_floater).sum() <= 0.02 * (~is_floater).sum()
+    assert (found & is_floater).sum() >= 0.95 * is_floater.sum()
 
 
 def test_a_higher_strength_takes_what_a_lower_one_takes(scene):
@@ -75,5 +105,4 @@ def test_a_scene_of_one_splat_has_no_floater():
     removed = np.ones(splats.n_splats, bool)
     removed[ellipses.rows[0]] = False
     one = occupancy_ellipses(splats, removed=removed)
-    graph = splat_graph(one, GraphOptions())
-    assert len(floaters(splats, one, graph.matrix(), contributions(splats, one)).at(0.5)) == 1
+    assert len(floaters(one, contributions(splats, one)).at(0.5)) == 1
