@@ -56,6 +56,8 @@ def edit_for(held: plain.Edit | SessionFile | None, file: "SplatFile", say: Call
 def deform_frames(options: argparse.Namespace) -> int:
     """Write a PLY for each frame of a session."""
     from splap_editor.engine.frames import frame_range, write_frames
+    from splap_editor.io.formats.table import format_to_write
+    from splap_editor.io.splat_files import losses_of_saving
 
     if options.columns:
         raise ValueError("--columns goes with one PLY, not with --frames")
@@ -65,6 +67,8 @@ def deform_frames(options: argparse.Namespace) -> int:
         raise ValueError("--frames needs keyframes: give a session saved by the editor with --session")
     frames = frame_range(options.frames, held.timeline.n_frames)
     file, poser = _prepared(options, held, report)
+    for loss in losses_of_saving(file, format_to_write(options.output)):
+        report.say(f"lost in {options.output.name}: {loss}")
     with report("frames"):
         as_3dgs, said = options.as_3dgs, report.say
         written = write_frames(poser, file, frames, options.output, as_3dgs=as_3dgs, say=said, progress=report.progress)

@@ -69,6 +69,15 @@ def test_frames_of_a_session_become_files(tmp_path, ply, session, capsys):
     assert (tmp_path / "out.ply").read_bytes() == (tmp_path / names[2]).read_bytes()
 
 
+def test_frames_in_a_format_that_loses_something_say_so_first(tmp_path, ply, session, capsys):
+    _, path = session
+    arguments = ["deform", str(ply), "--session", str(path), "-o", str(tmp_path / "out.spz"), "--frames", "1-2"]
+    assert main(arguments) == 0
+    said = capsys.readouterr().err
+    assert said.index("lost in out.spz: ") < said.index("wrote 2 files")
+    assert (tmp_path / "out_0002.spz").exists()
+
+
 def test_a_session_deforms_as_its_recipe_does(tmp_path, ply, session):
     held, path = session
     write_recipe(tmp_path / "edit.json", held.recipe)
