@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 
 from splap_editor.io.ply import read_ply, write_ply
-from tests.campaign.checks import CHECKS
 from tests.campaign.display import display
 from tests.campaign.inputs import Found, try_inputs
+from tests.campaign.kinds import KINDS
 from tests.campaign.seeds import odd_plys
 from tests.campaign.writes import try_writes
 
@@ -25,7 +25,7 @@ def test_no_input_breaks_anything():
     assert found.counts["inputs"] == N_INPUTS
     # Without Xvfb there is nowhere to open a window.
     assert found.counts["windows"] >= 5 or where is None
-    assert min(found.counts[f"{kind} accepted"] for kind in CHECKS) > 20
+    assert min(found.counts[f"{kind} accepted"] for kind in KINDS) > 20
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="writers are forked to start fast")

@@ -9,12 +9,15 @@ from time import monotonic
 
 from tests.campaign.display import display
 from tests.campaign.inputs import Found, try_inputs
+from tests.campaign.kinds import KINDS
 from tests.campaign.writes import try_writes
 
 FAR = 1 << 40
 
 
-def campaign(minutes: float, seed: int, n_workers: int, n_writes: int, shown_share: int) -> tuple[Counter, list[str]]:
+def campaign(
+    minutes: float, seed: int, n_workers: int, n_writes: int, shown_share: int, kinds: list[str]
+) -> tuple[Counter, list[str]]:
     """Cut off writes, then try inputs on some processes side by side."""
     until = monotonic() + 60.0 * minutes
     counts: Counter = Counter()
@@ -27,9 +30,9 @@ def campaign(minutes: float, seed: int, n_workers: int, n_writes: int, shown_sha
     with display() as where:
         if where is None:
             print("no window is opened: Xvfb, which gives it a display, is not installed")
-        windows = {"display": where, "shown_share": shown_share}
+        options = {"kinds": kinds, "display": where, "shown_share": shown_share}
         threads = [
-            threading.Thread(target=try_inputs, args=(seed, those, until, held), kwargs=windows)
+            threading.Thread(target=try_inputs, args=(seed, those, until, held), kwargs=options)
             for those, held in zip(numbers, found, strict=True)
         ]
         for thread in threads:
@@ -50,10 +53,13 @@ def main() -> int:
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--writes", type=int, default=900, help="writes to cut off, a third of them by each way")
     parser.add_argument("--shown", type=int, default=100, help="one in so many accepted splat files gets a window")
+    parser.add_argument("--kinds", nargs="+", choices=KINDS, default=list(KINDS), metavar="KIND", help=", ".join(KINDS))
     options = parser.parse_args()
-    counts, failures = campaign(options.minutes, options.seed, options.workers, options.writes, options.shown)
-    for failure in failures:
-        print(failure, end="\n\n")
+    counts, failures = campaign(
+        options.minutes, options.seed, options.workers, options.writes, options.shown, options.kinds
+    )
+    if failures:
+        print(f"{len(failures)} failures:", *failures, sep="\n\n", end="\n\n")
     for name in (
         "inputs",
         "windows",

@@ -5,23 +5,32 @@ import os
 import selectors
 import subprocess
 import sys
+import tempfile
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass, field
+from pathlib import Path
 from time import monotonic
 
-from tests.campaign.checks import OTHER_FORMATS, is_deformed
-from tests.campaign.worker import input_of, kind_of
+from tests.campaign.kinds import KINDS, in_turn, input_of
 
 SECONDS = 5.0
-START_SECONDS = 120.0
+"""Of processor time, after which an input is taken to hang: what other programs do beside it counts for nothing."""
+
 WINDOW_SECONDS = 30.0
 """For opening a window, preparing, binding, a drag and closing, on a display without hardware."""
 
+IDLE_SECONDS = 120.0
+"""Of waiting, after which a process is taken to be stuck though it computes nothing."""
+
+START_SECONDS = 600.0
+"""For importing and compiling."""
+
+SHARED_MEMORY = Path("/dev/shm")
+"""A folder whose files are never written to a disk, on Linux."""
+
 FINE = ("accepted", "refused", "shown", "nothing to drag")
 WINDOWS_LIKE_ANYWHERE = {"QT_API": "pyside6", "QT_QPA_PLATFORM": "xcb", "LIBGL_ALWAYS_SOFTWARE": "1"}
-
-SHOWN = ("ply", *OTHER_FORMATS)
-"""Kinds that a window opens."""
 
 
 class Worker:
@@ -37,7 +46,9 @@ class Worker:
     """
 
     def __init__(self, seed: int, module: str = "tests.campaign.worker", display: str | None = None) -> None:
-        self._arguments = [sys.executable, "-m", module, str(seed)]
+        # What dies leaves its files, so that they are not its own.
+        self._folder = tempfile.TemporaryDirectory(dir=SHARED_MEMORY if os.access(SHARED_MEMORY, os.W_OK) else None)
+        self._arguments = [sys.executable, "-m", module, str(seed), self._folder.name]
         self._environment = {**os.environ, **({} if display is None else WINDOWS_LIKE_ANYWHERE | {"DISPLAY": display})}
         self._seconds = SECONDS if display is None else WINDOW_SECONDS
         self._is_windowed = display is not None
@@ -52,35 +63,50 @@ class Worker:
             text=True,
             env=self._environment,
         )
-        # The first window, and the first deformation, of a process wait for their loops.
-        self._is_fresh = True
+        # The first window of a process waits for its loops.
+        self._is_fresh = self._is_windowed
         assert self._answer(START_SECONDS) == "ready"
 
-    def ask(self, number: int, left_out: tuple[int, ...] = ()) -> str:
+    def ask(self, kind: str, number: int, left_out: tuple[int, ...] = ()) -> str:
         """What became of an input: accepted, refused, ``crash …``, ``hang``, or a traceback."""
-        self._process.stdin.write(",".join(map(str, (number, *left_out))) + "\n")
+        self._process.stdin.write(",".join(map(str, (kind, number, *left_out))) + "\n")
         self._process.stdin.flush()
-        is_slow = self._is_fresh if self._is_windowed else is_deformed(number)
+        answer = self._answer(START_SECONDS if self._is_fresh else self._seconds)
         self._is_fresh = False
-        answer = self._answer(START_SECONDS if is_slow else self._seconds)
         if answer is not None and answer:
             return ast.literal_eval(answer)
         found = "hang" if answer is None else f"crash {self._process.wait()}"
-        self.close()
+        self._end()
         self._start()
         return found
 
     def _answer(self, seconds: float) -> str | None:
+        """The next line; None if the process computed for that long without one, or waited for much longer."""
+        start, used = monotonic(), self._processor_time()
         with selectors.DefaultSelector() as selector:
             selector.register(self._process.stdout, selectors.EVENT_READ)
-            if not selector.select(seconds):
-                return None
+            while not selector.select(seconds):
+                waited = monotonic() - start
+                if waited > max(IDLE_SECONDS, seconds) or self._processor_time(waited) - used > seconds:
+                    return None
         return self._process.stdout.readline().strip()
 
-    def close(self) -> None:
-        """End the process."""
+    def _processor_time(self, otherwise: float = 0.0) -> float:
+        """Seconds that the process and those it waited for have computed; where no file says so, another number."""
+        try:
+            words = Path(f"/proc/{self._process.pid}/stat").read_text().rpartition(")")[2].split()
+        except OSError:
+            return otherwise
+        return sum(map(int, words[11:15])) / os.sysconf("SC_CLK_TCK")
+
+    def _end(self) -> None:
         self._process.kill()
         self._process.communicate()
+
+    def close(self) -> None:
+        """End the process, and take its files away."""
+        self._end()
+        self._folder.cleanup()
 
 
 @dataclass
@@ -92,27 +118,36 @@ class Found:
 
 
 def try_inputs(
-    seed: int, numbers: range, until: float, found: Found, *, display: str | None = None, shown_share: int = 100
+    seed: int,
+    numbers: range,
+    until: float,
+    found: Found,
+    *,
+    kinds: Iterable[str] = KINDS,
+    display: str | None = None,
+    shown_share: int = 100,
 ) -> Found:
-    """Try numbers one after another until a time of the monotonic clock.
+    """Try numbers one after another, the kinds in turn, until a time of the monotonic clock.
 
     Of the splat files that are accepted one in ``shown_share`` is opened in a
     window and dragged as well, where there is a display.
     """
+    names = in_turn(kinds)
     workers = [Worker(seed)]
     n_to_show = 0
     try:
         for number in numbers:
             if monotonic() >= until:
                 break
-            answer = _tried(workers[0], seed, number, found)
+            kind = names[number % len(names)]
+            answer = _tried(workers[0], seed, kind, number, found)
             found.counts["inputs"] += 1
-            if display is None or answer != "accepted" or kind_of(number) not in SHOWN:
+            if display is None or answer != "accepted" or not KINDS[kind].is_shown:
                 continue
             n_to_show += 1
             if n_to_show % shown_share == 0:
                 workers += [Worker(seed, "tests.campaign.window", display)] * (len(workers) == 1)
-                _tried(workers[1], seed, number, found)
+                _tried(workers[1], seed, kind, number, found)
                 found.counts["windows"] += 1
     finally:
         for worker in workers:
@@ -120,23 +155,25 @@ def try_inputs(
     return found
 
 
-def _tried(worker: Worker, seed: int, number: int, found: Found) -> str:
+def _tried(worker: Worker, seed: int, kind: str, number: int, found: Found) -> str:
     """What became of an input; what broke is made small and kept."""
-    answer = worker.ask(number)
+    answer = worker.ask(kind, number)
     if answer in FINE:
-        found.counts[f"{kind_of(number)} {answer}"] += 1
+        found.counts[f"{kind} {answer}"] += 1
     else:
-        found.counts["hangs" if answer == "hang" else "crashes" if answer[:5] == "crash" else "tracebacks"] += 1
-        found.failures.append(_smallest(worker, seed, number, answer))
+        what = "hangs" if answer == "hang" else "crashes" if answer[:5] == "crash" else "tracebacks"
+        found.counts[what] += 1
+        found.failures.append(_smallest(worker, seed, kind, number, answer))
+        print(found.failures[-1], end="\n\n", flush=True)
     return answer
 
 
-def _smallest(worker: Worker, seed: int, number: int, answer: str) -> str:
+def _smallest(worker: Worker, seed: int, kind: str, number: int, answer: str) -> str:
     """Leave out what does not matter, and say what is left."""
-    _, names = input_of(seed, number)
+    _, names = input_of(seed, kind, number)
     left_out: tuple[int, ...] = ()
     for i in range(len(names)):
-        if worker.ask(number, (*left_out, i)) == answer:
+        if worker.ask(kind, number, (*left_out, i)) == answer:
             left_out = (*left_out, i)
-    _, kept = input_of(seed, number, left_out)
-    return f"{kind_of(number)} {number} of seed {seed}, left out {left_out}, {kept}: {answer.strip()[-1500:]}"
+    _, kept = input_of(seed, kind, number, left_out)
+    return f"{kind} {number} of seed {seed}, left out {left_out}, {kept}: {answer.strip()[-1500:]}"

@@ -137,15 +137,36 @@ def json_value(data: bytes, rng: np.random.Generator) -> bytes:
     return json.dumps(held).encode()
 
 
-def unpacked_bytes(data: bytes, rng: np.random.Generator) -> bytes:
-    """Bytes inside a gzip, or of a member of a zip, changed and packed again."""
-    change = BYTES[int(rng.integers(len(BYTES)))]
+def header_number(data: bytes, rng: np.random.Generator) -> bytes:
+    """A number of one, two, four or eight bytes near the start, or after a mark within, becomes an odd one."""
+    marks = [0, *(data.find(mark) for mark in MARKS if mark in data), *(at for at in (4096,) if at < len(data))]
+    width = int(rng.choice([1, 2, 4, 4, 8]))
+    at = marks[int(rng.integers(len(marks)))] + int(rng.integers(0, 64)) // min(width, 4) * min(width, 4)
+    if at + width > len(data):
+        return data
+    old = int.from_bytes(data[at : at + width], "little")
+    odd = (0, 1, old + 1, old - 1, 2 * old, old << 8, len(data), 0x7FFFFFFF, 0xFFFFFFFF, -1, 1 << 31, 1 << 63, 65535)
+    new = odd[int(rng.integers(len(odd)))] % (1 << 8 * width)
+    return data[:at] + new.to_bytes(width, "little") + data[at + width :]
+
+
+def structure(data: bytes, rng: np.random.Generator) -> bytes:
+    """What a file is made of, one layer in: of a gzip or a zip the contents, of JSON a value, of text a word."""
     if data[:2] == b"\x1f\x8b":
+        change = (header_number, odd_floats, *BYTES)[int(rng.integers(2 + len(BYTES)))]
         try:
             return gzip.compress(change(gzip.decompress(data), rng), 1)
         except (OSError, EOFError, zlib.error):
             return data
-    return _with_member(data, rng, None, change)
+    if data[:4] == b"PK\x03\x04":
+        return _with_member(data, rng)
+    if data[:4] == b"glTF":
+        return chunk_value(data, rng)
+    if data[:1] == b"{":
+        return json_value(data, rng)
+    if data[:6] == b"#usda ":
+        return (text_token, header_token, header_lines)[int(rng.integers(3))](data, rng)
+    return header_number(data, rng)
 
 
 def chunk_value(data: bytes, rng: np.random.Generator) -> bytes:
@@ -157,43 +178,46 @@ def chunk_value(data: bytes, rng: np.random.Generator) -> bytes:
     return whole[:8] + len(whole).to_bytes(4, "little") + whole[12:]
 
 
-def member_value(data: bytes, rng: np.random.Generator) -> bytes:
-    """A value in the meta.json of a zip becomes another."""
-    return _with_member(data, rng, "meta.json", json_value)
-
-
-def _with_member(data: bytes, rng: np.random.Generator, name: str | None, change: Mutation) -> bytes:
+def _with_member(data: bytes, rng: np.random.Generator) -> bytes:
+    """A zip with the contents of a member changed, or its name, or how it is packed, or one member more."""
     out = io.BytesIO()
+    how = int(rng.integers(8))
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as old, zipfile.ZipFile(out, "w") as new:
             names = old.namelist()
-            chosen = name or names[int(rng.integers(len(names)))]
+            chosen = names[int(rng.integers(len(names)))]
+            if how < 3 and any(name.endswith(".json") for name in names):
+                chosen = next(name for name in names if name.endswith(".json"))
             for each in names:
-                new.writestr(each, change(old.read(each), rng) if each == chosen else old.read(each))
+                held, name, packing = old.read(each), each, zipfile.ZIP_STORED
+                if each == chosen and how < 5:
+                    held = structure(held, rng) if rng.integers(2) else BYTES[int(rng.integers(len(BYTES)))](held, rng)
+                elif each == chosen and how == 5:
+                    name = NAMES[int(rng.integers(len(NAMES)))]
+                elif each == chosen and how == 6:
+                    packing = (zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA)[int(rng.integers(3))]
+                    held += bytes(int(rng.choice([0, 1 << 20, 1 << 26], p=[0.6, 0.35, 0.05])))
+                elif each == chosen:
+                    new.writestr(zipfile.ZipInfo(each + "2"), held)
+                new.writestr(zipfile.ZipInfo(name), held, packing)
     # A zip that was broken before stays as it is.
     except Exception:
         return data
     return out.getvalue()
 
 
+NAMES = ("", "/etc/passwd", "../../meta.json", "meta.json", "C:\\x", "a/b", "\xa0", "x" * 300, "means_l.webp", "x.usda")
+MARKS = (b"PK\x01\x02", b"PK\x05\x06", b"VP8L", b"VP8X", b"TOKENS", b"FIELDS", b"SPECS", b"BIN\0")
+"""Where numbers stand together: in zips, pictures, stages and glTF."""
+
 BYTES: tuple[Mutation, ...] = (flip_bits, truncate, repeat_or_drop, odd_bytes)
-MUTATIONS: dict[str, tuple[Mutation, ...]] = {
-    "ply": (header_token, header_token, header_lines, text_token, odd_floats, odd_floats, *BYTES),
-    "recipe": (json_value, json_value, json_value, text_token, *BYTES),
-    "session": (json_value, json_value, json_value, text_token, *BYTES),
-    "npz": (flip_bits, *BYTES),
-    "cache": (flip_bits, *BYTES),
-    "spz": (unpacked_bytes, unpacked_bytes, *BYTES),
-    "sog": (member_value, member_value, unpacked_bytes, *BYTES),
-    "ksplat": (odd_floats, *BYTES),
-    "glb": (chunk_value, chunk_value, odd_floats, *BYTES),
-    "splat": (odd_floats, *BYTES),
-}
+TEXT: tuple[Mutation, ...] = (header_token, header_token, header_lines, text_token, odd_floats, odd_floats, *BYTES)
+DOCUMENT: tuple[Mutation, ...] = (json_value, json_value, json_value, text_token, *BYTES)
+PACKED: tuple[Mutation, ...] = (structure, structure, structure, structure, header_number, odd_floats, *BYTES)
 
 
-def mutations_of(kind: str, rng: np.random.Generator) -> list[tuple[Mutation, int]]:
+def chosen_of(pool: tuple[Mutation, ...], rng: np.random.Generator) -> list[tuple[Mutation, int]]:
     """What is done to a file, each with the seed of its own generator; now and then nothing."""
-    pool = MUTATIONS[kind]
     count = int(rng.choice([0, 1, 1, 1, 2, 3, 5]))
     return [(pool[int(rng.integers(len(pool)))], int(rng.integers(2**32))) for _ in range(count)]
 

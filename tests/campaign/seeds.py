@@ -1,11 +1,14 @@
 """Sound files that the mutations start from, each made from a number."""
 
+import base64
 import gzip
 import json
 import struct
+import tempfile
 from collections.abc import Callable
 from functools import cache
 from io import BytesIO
+from pathlib import Path
 
 import numpy as np
 from hypothesis import strategies as st
@@ -15,6 +18,8 @@ from splap_editor.core.progress import no_progress
 from splap_editor.core.splats.splats import Splats
 from splap_editor.io.formats.splat32 import RECORD
 from splap_editor.io.formats.table import FORMATS as FORMATS_OF_SPLATS
+from splap_editor.io.formats.table import SplatFormat
+from tests.campaign.forks import forked, is_forked
 from tests.reference.ply import compressed_bytes, ply_bytes, splat_columns
 
 FORMATS = ("binary_little_endian", "binary_big_endian", "ascii")
@@ -69,14 +74,20 @@ def _packed(which: int) -> bytes:
 
 
 def ply(number: int) -> bytes:
-    """Any splat file; one in eight is packed."""
-    return _packed(number // 8 % 4) if number % 8 == 0 else odd_ply(number)
+    """A PLY of splats in plain columns."""
+    return odd_ply(number)
+
+
+def compressed_ply(number: int) -> bytes:
+    """SuperSplat's packed PLY, as we write it or as its reference does."""
+    return _packed(number // 2 % 4) if number % 2 else _written("compressed-ply", number // 2 % 12)
 
 
 def recipe(number: int) -> bytes:
     """A recipe with a bit of everything."""
     rng = np.random.default_rng(number)
     pose = {"translate": rng.normal(size=3).tolist(), "rotate": rng.normal(size=4).tolist(), "scale": 1.5}
+    place = {"center": [0, 0, 0], "translate": rng.normal(size=3).tolist(), "rotate": rng.normal(size=4).tolist()}
     held = {
         "version": 1,
         "method": str(rng.choice(["arap", "bbw"])),
@@ -88,7 +99,30 @@ def recipe(number: int) -> bytes:
         "adaptation": "affine",
         "hops": 2,
     }
+    if number % 3 == 1:
+        apart = {"a": [rng.normal(size=3).tolist()], "b": [rng.normal(size=3).tolist(), [0, 0, 0]]}
+        held["graph"] |= {"separate": [{**apart, "wider": 1}], "join": [{**apart, "reach": 0.5}], "carriers": "solid"}
+        held["remove"] = _removals(rng)
+        held["place"] = {**place, "scale": 2.0}
+    if number % 3 == 2:
+        names = str(rng.choice(["edges", "space", "mahalanobis"])), str(rng.choice(["stars", "robust"]))
+        held["graph"] = {"neighborhood": names[0], "laplacian": names[1], "k": 5}
+        held |= {"preset": "paper"} if number % 2 else {"blending": "linear", "adaptation": "paper"}
+        held["remove"] = _removals(rng)[int(rng.integers(6))]
     return json.dumps(held).encode()
+
+
+def _removals(rng: np.random.Generator) -> list[dict]:
+    """One of each way to say what goes, some turned round."""
+    center = rng.normal(size=3).tolist()
+    return [
+        {"rows": [0, 7]},
+        {"box": {"center": center, "size": [4, 4, 4], "rotate": rng.normal(size=4).tolist()}, "outside": True},
+        {"sphere": {"center": center, "radius": 0.2}},
+        {"plane": {"point": [0, 0, -2], "normal": [0, 0, -1]}},
+        {"quantity": {"name": "alpha", "least": 0.0, "most": 0.01}, "restore": bool(rng.integers(2))},
+        {"floaters": {"strength": 0.3}},
+    ]
 
 
 def session(number: int) -> bytes:
@@ -118,30 +152,80 @@ def npz(number: int) -> bytes:
     return data.getvalue()
 
 
-@cache
-def _other(ending: str, which: int) -> bytes:
-    """A small file of another format."""
+def small_splats(which: int) -> Splats:
+    """Up to a dozen splats of any degree."""
     rng = np.random.default_rng(which)
-    n, degree = int(rng.integers(1, 12)), int(rng.integers(0, 4))
-    n_rest = (degree + 1) ** 2 - 1
-    if ending == "splat":
-        return splat_records(n, rng).tobytes()
-    if ending == "ksplat":
-        return ksplat_bytes(n, rng)
+    n, degree = int(rng.integers(1, 12)), which % 4
     quats = rng.normal(size=(n, 4)).astype("f4")
-    splats = Splats(
+    return Splats(
         means=rng.normal(size=(n, 3)).astype("f4"),
         log_scales=rng.uniform(-6, -1, (n, 3)).astype("f4"),
         quats=quats / np.linalg.norm(quats, axis=1)[:, None],
         logit_opacities=rng.normal(size=n).astype("f4"),
         sh0=rng.normal(size=(n, 3)).astype("f4"),
-        shN=rng.normal(size=(n, n_rest, 3)).astype("f4"),
+        shN=rng.normal(size=(n, (degree + 1) ** 2 - 1, 3)).astype("f4"),
     )
-    out = BytesIO()
-    FORMATS_OF_SPLATS[ending if ending != "glb" else "gltf"].write(out, splats, no_progress)
-    if ending == "spz" and which % 2:
-        return _spz_4(gzip.decompress(out.getvalue()), n, degree)
-    return out.getvalue()
+
+
+@cache
+def _written(name: str, which: int) -> bytes:
+    """A small file of a format, as we write it; what may crash does so in a process of its own."""
+
+    def encoded() -> bytes:
+        out = BytesIO()
+        FORMATS_OF_SPLATS[name].write(out, small_splats(which), no_progress)
+        return out.getvalue()
+
+    return forked(encoded) if is_forked(FORMATS_OF_SPLATS[name]) else encoded()
+
+
+@cache
+def _spz(which: int) -> bytes:
+    """An SPZ of version 1, 2, 3 or 4."""
+    packed = _written("spz", which // 4)
+    if which % 4 == 2:
+        return packed
+    splats = small_splats(which // 4)
+    n, degree = splats.n_splats, splats.sh_degree
+    columns = _columns_of_spz(gzip.decompress(packed), n, degree)
+    if which % 4 == 3:
+        return _spz_4(columns, n, degree)
+    rng = np.random.default_rng(which)
+    columns[4] = rng.integers(0, 256, 3 * n, "u1").tobytes()
+    if which % 4 == 0:
+        columns[0] = splats.means.astype("<f2").tobytes()
+    return gzip.compress(struct.pack("<4sIIBBBB", b"NGSP", which % 4 + 1, n, degree, 12, 0, 0) + b"".join(columns))
+
+
+@cache
+def _gltf(which: int) -> bytes:
+    """A ``.glb``, or the same as text with its numbers in it."""
+    packed = _written("gltf", which // 2)
+    if which % 2:
+        return packed
+    length = int.from_bytes(packed[12:16], "little")
+    held = json.loads(packed[20 : 20 + length])
+    numbers = base64.b64encode(packed[28 + length :]).decode()
+    held["buffers"][0]["uri"] = f"data:application/octet-stream;base64,{numbers}"
+    held["nodes"] += [{"children": [0], "translation": [1, 2, 3], "scale": [2, 2, 2]}]
+    held["scenes"][0]["nodes"] = [1]
+    return json.dumps(held).encode()
+
+
+@cache
+def _usd(which: int) -> bytes:
+    """A stage as it is written, or as text."""
+    packed = _written("usd", which // 2)
+    return packed if which % 2 else forked(lambda: _as_text(packed))
+
+
+def _as_text(stage: bytes) -> bytes:
+    from pxr import Sdf
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "stage.usdc")
+        path.write_bytes(stage)
+        return Sdf.Layer.FindOrOpen(str(path)).ExportToString().encode()
 
 
 def splat_records(n: int, rng: np.random.Generator) -> np.ndarray:
@@ -171,18 +255,36 @@ def ksplat_bytes(n: int, rng: np.random.Generator) -> bytes:
     return bytes(head + section) + partial + centers + rng.integers(0, 60, n * width).astype("u1").tobytes()
 
 
-def _spz_4(unpacked: bytes, n: int, degree: int) -> bytes:
-    """The same splats as version 4, each column a stream of zstd."""
+def _columns_of_spz(unpacked: bytes, n: int, degree: int) -> list[bytes]:
     widths = [9, 1, 3, 3, 4, 3 * ((degree + 1) ** 2 - 1)]
     ends = 16 + n * np.cumsum(widths)
-    columns = [unpacked[end - n * width : end] for end, width in zip(ends, widths, strict=True) if width]
+    return [unpacked[end - n * width : end] for end, width in zip(ends, widths, strict=True)]
+
+
+def _spz_4(columns: list[bytes], n: int, degree: int) -> bytes:
+    """The same splats as version 4, each column a stream of zstd."""
+    columns = [column for column in columns if column]
     packed = [ZstdCompressor().compress(column) for column in columns]
-    head = struct.pack("<4sIIBBBBI12x", b"NGSP", 4, n, degree, unpacked[13], 0, len(columns), 32)
+    head = struct.pack("<4sIIBBBBI12x", b"NGSP", 4, n, degree, 12, 0, len(columns), 32)
     sizes = [struct.pack("<QQ", len(a), len(b)) for a, b in zip(packed, columns, strict=True)]
     return head + b"".join(sizes) + b"".join(packed)
 
 
-KINDS: dict[str, Callable[[int], bytes]] = {"ply": ply, "recipe": recipe, "session": session, "npz": npz, "cache": npz}
-OTHERS = ("spz", "sog", "ksplat", "splat", "glb")
-KINDS |= {ending: lambda number, ending=ending: _other(ending, number % 24) for ending in OTHERS}
-"""What is read, and what makes it; a cache entry is made from its archive by the check."""
+_SEEDS: dict[str, Callable[[int], bytes]] = {
+    "ply": ply,
+    "compressed-ply": compressed_ply,
+    "spz": lambda number: _spz(number % 48),
+    "gltf": lambda number: _gltf(number % 24),
+    "usd": lambda number: _usd(number % 16),
+    "ksplat": lambda number: ksplat_bytes(number % 11 + 1, np.random.default_rng(number)),
+    "splat": lambda number: splat_records(number % 11 + 1, np.random.default_rng(number)).tobytes(),
+}
+"""Formats that are only read, or come in more ways than we write them."""
+
+
+def splat_file(row: SplatFormat) -> Callable[[int], bytes]:
+    """What makes files of a format: of its own, or else as we write it."""
+    own = _SEEDS.get(row.name)
+    if own is None and not row.writes:
+        raise LookupError(f"{row.title} is only read: tests/campaign/seeds.py needs a function that makes such files")
+    return own or (lambda number: _written(row.name, number % 24))

@@ -1,9 +1,8 @@
-"""A process that opens inputs in the real window: ``python -m tests.campaign.window SEED``, on a display of its own."""
+"""A process that opens inputs in the real window: ``python -m tests.campaign.window SEED FOLDER``, on a display."""
 
 import gc
 import os
 import sys
-import tempfile
 import traceback
 from collections.abc import Callable
 from pathlib import Path
@@ -20,7 +19,8 @@ from splap_editor.core.pose import Pose
 from splap_editor.ui.main_window import MainWindow
 from splap_editor.ui.theme import apply_theme
 from splap_editor.ui.viewport_widget import ask_of_qt
-from tests.campaign.worker import answer_lines, written_input
+from tests.campaign.kinds import written_input
+from tests.campaign.worker import answer_lines
 
 WAIT_SECONDS = 60.0
 """After which a window is taken to hang; the first of a process waits for compiled loops."""
@@ -86,9 +86,9 @@ def drag(window: MainWindow) -> None:
         session.drag.commit("Move handle")
 
 
-def tried(folder: Path, seed: int, number: int, left_out: tuple[int, ...] = ()) -> str:
+def tried(folder: Path, seed: int, kind: str, number: int, left_out: tuple[int, ...] = ()) -> str:
     """``"shown"``, ``"nothing to drag"``, or a traceback; what is written to standard error counts as one."""
-    path = written_input(folder, seed, number, left_out)
+    path = written_input(folder, seed, kind, number, left_out)
     complaints = folder / "stderr"
     held = os.dup(2)
     with complaints.open("wb") as file:
@@ -122,15 +122,15 @@ def shown(path: Path) -> str:
 
 def main() -> None:
     """Answer numbers, as `tests.campaign.worker`."""
-    with tempfile.TemporaryDirectory() as folder:
-        os.environ["SPLAP_STATE_DIR"] = os.path.join(folder, "state")
-        ask_of_qt()
-        app = QApplication(["splap-editor"])
-        QCoreApplication.setOrganizationName("splap-editor-campaign")
-        QSettings.setDefaultFormat(QSettings.Format.IniFormat)
-        QSettings.setPath(QSettings.Format.IniFormat, QSettings.Scope.UserScope, os.path.join(folder, "settings"))
-        apply_theme(app)
-        answer_lines(tried, Path(folder), int(sys.argv[1]))
+    folder = sys.argv[2]
+    os.environ["SPLAP_STATE_DIR"] = os.path.join(folder, "state")
+    ask_of_qt()
+    app = QApplication(["splap-editor"])
+    QCoreApplication.setOrganizationName("splap-editor-campaign")
+    QSettings.setDefaultFormat(QSettings.Format.IniFormat)
+    QSettings.setPath(QSettings.Format.IniFormat, QSettings.Scope.UserScope, os.path.join(folder, "settings"))
+    apply_theme(app)
+    answer_lines(tried, Path(folder), int(sys.argv[1]))
 
 
 if __name__ == "__main__":

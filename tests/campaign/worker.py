@@ -1,4 +1,6 @@
-"""A process that tries one input after another, each made from its number: ``python -m tests.campaign.worker SEED``."""
+"""A process that tries one input after another, each made from its number:
+``python -m tests.campaign.worker SEED FOLDER``.
+"""
 
 import contextlib
 import os
@@ -9,56 +11,41 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-
-from tests.campaign.checks import CHECKS, OTHER_FORMATS
-from tests.campaign.mutations import mutated, mutations_of
-from tests.campaign.seeds import KINDS
+from tests.campaign.checks import carry_out
+from tests.campaign.forks import read_stages_in_forks
+from tests.campaign.kinds import KINDS, written_input
 
 MEMORY_BYTES = 4 << 30
-SUFFIXES = {"ply": "ply", "recipe": "json", "session": "splap", "npz": "npz", "cache": "npz"}
-SUFFIXES |= {kind: kind for kind in OTHER_FORMATS}
-# Splat files have most to go wrong.
-SHARES = ("ply", "ply", "ply", "ply", "recipe", "session", "npz", "cache", *OTHER_FORMATS)
+MOST_MORE_BYTES = 320 << 20
+"""Of memory that the highest mark rises by at an input, all of which are small."""
 
 
-def kind_of(number: int) -> str:
-    """What is tried under a number."""
-    return SHARES[number % len(SHARES)]
-
-
-def input_of(seed: int, number: int, left_out: tuple[int, ...] = ()) -> tuple[bytes, list[str]]:
-    """The input of a number and the mutations that made it; some may be left out, to find those that matter."""
-    rng = np.random.default_rng([seed, number])
-    kind = kind_of(number)
-    chosen = mutations_of(kind, rng)
-    kept = [mutation for i, mutation in enumerate(chosen) if i not in left_out]
-    data = KINDS[kind](int(rng.integers(2**31)))
-    return mutated(data, kept), [mutation.__name__ for mutation, _ in kept]
-
-
-def written_input(folder: Path, seed: int, number: int, left_out: tuple[int, ...] = ()) -> Path:
-    """Write the input of a number to a file."""
-    data, _ = input_of(seed, number, left_out)
-    path = folder / f"scene.{SUFFIXES[kind_of(number)]}"
-    path.write_bytes(data)
-    return path
-
-
-def tried(folder: Path, seed: int, number: int, left_out: tuple[int, ...] = ()) -> str:
+def tried(folder: Path, seed: int, kind: str, number: int, left_out: tuple[int, ...] = ()) -> str:
     """``"accepted"``, ``"refused"``, or a traceback."""
-    path = written_input(folder, seed, number, left_out)
+    path = written_input(folder, seed, kind, number, left_out)
+    before = _most_memory()
     try:
         with warnings.catch_warnings():
             # A warning would stand on standard error.
             warnings.filterwarnings("error", module="splap_editor")
-            return "accepted" if CHECKS[kind_of(number)](path, number) else "refused"
+            found = "accepted" if KINDS[kind].is_accepted(path, number) else "refused"
     except Exception:
         return traceback.format_exc()
+    more = _most_memory() - before
+    return found if more <= MOST_MORE_BYTES else f"took {more >> 20} MiB for {path.stat().st_size:,} bytes"
+
+
+def _most_memory() -> int:
+    try:
+        import resource
+    except ImportError:
+        return 0
+    unit = 1 if sys.platform == "darwin" else 1024
+    return unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
 def answer_lines(try_one: Callable[..., str], folder: Path, seed: int) -> None:
-    """Answer each line ``number,left out…`` with a line, under the memory limit."""
+    """Answer each line ``kind,number,left out…`` with a line, under the memory limit."""
     with contextlib.suppress(ImportError):
         import resource
 
@@ -66,14 +53,24 @@ def answer_lines(try_one: Callable[..., str], folder: Path, seed: int) -> None:
     os.environ.setdefault("SPLAP_CACHE_DIR", tempfile.gettempdir())
     print("ready", flush=True)
     for line in sys.stdin:
-        number, *left_out = map(int, line.split(","))
-        print(repr(try_one(folder, seed, number, tuple(left_out))), flush=True)
+        kind, number, *left_out = line.strip().split(",")
+        print(repr(try_one(folder, seed, kind, int(number), tuple(map(int, left_out)))), flush=True)
+
+
+def warm_up(folder: Path) -> None:
+    """Load what is compiled: later a wait is the input's own."""
+    for number in range(6):
+        recipe = folder / "warm.json"
+        recipe.write_bytes(KINDS["recipe"].made(number))
+        carry_out(recipe, number)
 
 
 def main() -> None:
     """Try inputs."""
-    with tempfile.TemporaryDirectory() as folder:
-        answer_lines(tried, Path(folder), int(sys.argv[1]))
+    read_stages_in_forks()
+    folder = Path(sys.argv[2])
+    warm_up(folder)
+    answer_lines(tried, folder, int(sys.argv[1]))
 
 
 if __name__ == "__main__":

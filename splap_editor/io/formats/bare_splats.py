@@ -9,6 +9,9 @@ from splap_editor.core.splats.splats import Splats
 THIN_LOG_SCALE = float(np.log(1e-6))
 """Third log-scale given to 2DGS splats on their way to 3DGS programs."""
 
+LARGEST_LOG_SCALE = float(np.log(1e30))
+"""Larger than what lies within the limit of coordinates; formats that hold scales themselves would overflow later."""
+
 LARGEST_COEFFICIENT = np.float32(1e4)
 """Of colours: a coefficient of 2 is white already."""
 
@@ -34,7 +37,7 @@ def bare_splats(splats: Splats, largest_degree: int = 3, progress: Progress = no
     Returns
     -------
     bare : Splats
-        float32, three finite log-scales of at least log 1e-6, unit quaternions, finite logits within ±14.
+        float32, three log-scales from log 1e-6 to log 1e30, unit quaternions, finite logits within ±14.
     n_unusable : int
         Splats without a usable rotation, scale or opacity: they become invisible.
     """
@@ -50,7 +53,7 @@ def bare_splats(splats: Splats, largest_degree: int = 3, progress: Progress = no
         quats = np.array(splats.quats, np.float32)
         lengths = np.sqrt(np.einsum("nc,nc->n", quats, quats))
         usable = np.isfinite(lengths) & (lengths > 0)
-        usable &= ~np.isnan(log_scales).any(axis=1) & (log_scales < np.inf).all(axis=1) & ~np.isnan(logits)
+        usable &= ~np.isnan(log_scales).any(axis=1) & (log_scales <= LARGEST_LOG_SCALE).all(axis=1) & ~np.isnan(logits)
         quats /= lengths[:, None]
     progress(0.4)
     if splats.n_scales == 2:

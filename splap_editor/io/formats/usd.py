@@ -47,7 +47,7 @@ def read(source: Source, progress: Progress) -> tuple[PlyTable, list[str]]:
     _require_library()
     with tempfile.TemporaryDirectory() as folder:
         held = Path(folder) / "splats.npz"
-        told = _unpacked(source, held, progress)
+        told = unpacked(source, held, progress)
         if not held.exists():
             raise source.refused(*told) if told else source.damaged("its library gave up on it")
         try:
@@ -71,7 +71,7 @@ def read(source: Source, progress: Progress) -> tuple[PlyTable, list[str]]:
     return table, ["It is animated: these are the splats of its first frame."] if arrays["is_animated"] else []
 
 
-def _unpacked(source: Source, held: Path, progress: Progress) -> tuple[str, str] | None:
+def unpacked(source: Source, held: Path, progress: Progress) -> tuple[str, str] | None:
     """Let another process put the arrays of a stage into an archive; what it says where it does not."""
     command = [sys.executable, "-m", "splap_editor.io.formats.usd_arrays", str(source.path.resolve()), str(held)]
     process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)

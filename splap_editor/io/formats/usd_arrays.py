@@ -15,18 +15,18 @@ from splap_editor.io.ply_reader import available_memory
 
 _EVEN = 1e-4
 
+_BYTES, _TIMES = 3 << 29, 32
+"""Address space for a stage of any size, most of it never used, and more for each byte."""
+
+_SECONDS, _BYTES_A_SECOND = 20, 1 << 19
+"""The same of processor time."""
+
 
 def main(stage_path: str, out: str) -> int:
     """Write the arrays of all splats of a stage, in the axes of a PLY."""
-    with contextlib.suppress(ImportError):
-        import resource
-
-        _, hard = resource.getrlimit(resource.RLIMIT_AS)
-        most = min(available_memory() or 1 << 34, 1 << 36) + (1 << 30)
-        if hard == resource.RLIM_INFINITY or most < hard:
-            resource.setrlimit(resource.RLIMIT_AS, (most, most))
     from pxr import Usd, UsdGeom
 
+    _limit(Path(stage_path).stat().st_size)
     stage = Usd.Stage.Open(stage_path)
     prims = [prim for prim in stage.Traverse() if prim.GetTypeName() == "ParticleField3DGaussianSplat"]
     if not prims:
@@ -57,6 +57,23 @@ def main(stage_path: str, out: str) -> int:
     np.savez(part, allow_pickle=False, **joined)
     part.rename(out)
     return 0
+
+
+def _limit(n_bytes: int) -> None:
+    """Take no more memory and processor time than a stage of that size needs: a damaged one asks for any amount."""
+    with contextlib.suppress(ImportError):
+        import resource
+
+        statm = Path("/proc/self/statm")
+        held = int(statm.read_text().split()[0]) * resource.getpagesize() if statm.exists() else _BYTES
+        more = min(_BYTES + _TIMES * n_bytes, available_memory() or 1 << 36)
+        for kind, most in (
+            (resource.RLIMIT_AS, held + more),
+            (resource.RLIMIT_CPU, _SECONDS + n_bytes // _BYTES_A_SECOND),
+        ):
+            _, hard = resource.getrlimit(kind)
+            if hard == resource.RLIM_INFINITY or most < hard:
+                resource.setrlimit(kind, (most, most))
 
 
 def _told(what: str, advice: str) -> int:

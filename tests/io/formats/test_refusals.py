@@ -146,3 +146,13 @@ def test_an_edit_by_rows_fits_a_reordered_file_only_if_it_was_made_for_it(tmp_pa
     with pytest.raises(RecipeError, match="another order"):
         require_rows_fit(own, scene)
     assert rows_of(scene) == ""
+
+
+@pytest.mark.parametrize("ending", [".glb", ".usdc", ".spz", ".sog", ".compressed.ply"])
+def test_a_splat_too_large_for_any_format_becomes_invisible(tmp_path, scene, ending):
+    log_scales = scene.splats.log_scales.copy()
+    log_scales[3] = 100.0
+    file = dataclasses.replace(scene, splats=dataclasses.replace(scene.splats, log_scales=log_scales))
+    write_splats(tmp_path / f"out{ending}", file, file.splats)
+    again = read_splats(tmp_path / f"out{ending}").splats
+    assert np.isfinite(again.log_scales).all() and again.logit_opacities.min() < -5
