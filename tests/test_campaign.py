@@ -25,7 +25,7 @@ def test_no_input_breaks_anything():
     assert found.counts["inputs"] == N_INPUTS
     # Without Xvfb there is nowhere to open a window.
     assert found.counts["windows"] >= 5 or where is None
-    assert min(found.counts[f"{kind} accepted"] for kind in KINDS) > 20
+    assert min(found.counts[f"{kind} accepted"] for kind in KINDS) > 8
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="writers are forked to start fast")
