@@ -14,18 +14,18 @@ from tests.campaign.kinds import KINDS
 from tests.campaign.seeds import odd_plys
 from tests.campaign.writes import try_writes
 
-N_INPUTS = 4000
+N_INPUTS = 2400
 N_WRITES = 48
 
 
 def test_no_input_breaks_anything():
     with display() as where:
-        found = try_inputs(20, range(N_INPUTS), inf, Found(), display=where, shown_share=100)
+        found = try_inputs(20, range(N_INPUTS), inf, Found(), display=where, shown_share=60)
     assert found.failures == []
     assert found.counts["inputs"] == N_INPUTS
     # Without Xvfb there is nowhere to open a window.
     assert found.counts["windows"] >= 5 or where is None
-    assert min(found.counts[f"{kind} accepted"] for kind in KINDS) > 8
+    assert min(found.counts[f"{kind} accepted"] for kind in KINDS) > 3
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="writers are forked to start fast")

@@ -151,7 +151,9 @@ class _Ways:
         radius = np.maximum(np.maximum(near[tails], near[heads]), graph.lengths[entries])
         strength = np.ceil(_UNIT * (longest / radius) / (1.0 + touch) ** 2)
         ends = np.stack([number[tails], number[heads]], axis=1)
-        side = _first_side(ends, strength, number[self.first], number[self.second], len(nodes))
+        # Places pointed at that no way so short leads to have no say.
+        first, second = (held[held >= 0] for held in (number[self.first], number[self.second]))
+        side = _first_side(ends, strength, first, second, len(nodes))
         crossing = side[ends[:, 0]] != side[ends[:, 1]]
         edges = np.stack([tails, heads], axis=1)[crossing]
         # The other entry of each edge that is cut: rows of a symmetric graph are sorted.

@@ -154,3 +154,13 @@ def test_parts_that_are_none_are_refused(first, second, words):
     points, edges = grid(4, 4)
     with pytest.raises(ValueError, match=words):
         seam_between(graph_of(points, edges), np.array(first, int), np.array(second, int))
+
+
+def test_a_place_that_no_way_leads_to_changes_nothing():
+    points, edges = grid(20, 4)
+    apart, more = grid(3, 3, first=len(points))
+    graph = graph_of(np.concatenate([points, apart + 100.0]), np.concatenate([edges, more]))
+    alone = seam_between(graph, [5], [70])
+    for first, second in (([5], [70, len(points)]), ([5, len(points) + 3], [70])):
+        seam = seam_between(graph, np.array(first), np.array(second))
+        assert len(alone.edges) and np.array_equal(seam.edges, alone.edges)

@@ -156,3 +156,11 @@ def test_a_splat_too_large_for_any_format_becomes_invisible(tmp_path, scene, end
     write_splats(tmp_path / f"out{ending}", file, file.splats)
     again = read_splats(tmp_path / f"out{ending}").splats
     assert np.isfinite(again.log_scales).all() and again.logit_opacities.min() < -5
+
+
+def test_half_floats_that_are_no_numbers_are_refused_by_row(tmp_path):
+    # The second is a signalling one.
+    body = struct.pack("<6H", 0, 0x3C00, 0, 0x7D01, 0, 0) + bytes(2 * (1 + 3 + 3 + 3))
+    (tmp_path / "bad.spz").write_bytes(spz(2, version=1, body=body))
+    with pytest.raises(PlyError, match="row 1"):
+        read_splats(tmp_path / "bad.spz")
