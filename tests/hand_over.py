@@ -63,7 +63,8 @@ def _tried(sample: str, program: str, folder: Path) -> int:
     bare, _ = bare_splats(file.splats)
     failures = 0
     for row in FORMATS.values():
-        if not row.can_be_written:
+        # splat-transform knows no USD; `tests/io/formats/test_usd.py` reads ours with OpenUSD's own library.
+        if not row.can_be_written or row.name in ("usd", "usdz"):
             continue
         ours = folder / f"{sample}_ours{row.suffixes[0]}"
         write_splats(ours, file, file.splats, as_3dgs=file.splats.n_scales == 2)
