@@ -7,6 +7,7 @@ meanwhile. Two processes may do it at once: entries are written whole or not at 
 import contextlib
 import importlib
 import json
+import math
 import os
 import subprocess
 import sys
@@ -223,7 +224,8 @@ def _grouped(wanted: Iterable[Loop]) -> list[list[Loop]]:
 
 
 def _seconds(some: Iterable[Loop]) -> float:
-    return sum(loop.seconds for loop in some)
+    # Loops come from a set: an exact sum does not depend on their order.
+    return math.fsum(loop.seconds for loop in some)
 
 
 def _stamp() -> Path:

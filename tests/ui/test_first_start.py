@@ -106,8 +106,9 @@ def test_a_drag_waits_for_no_loop_that_it_does_not_call(empty_window, qtbot, mon
     try:
         first = open_first(empty_window, resource("samples", "tube.ply"), shares.append)
         qtbot.waitUntil(lambda: session.state == "ready", timeout=60_000)
+        qtbot.waitUntil(lambda: jobs[-1] is None, timeout=60_000)
         assert first.compilation.can_drag and not first.compilation.is_done
-        assert shares[-1] == 1.0 and jobs[-1] is None
+        assert shares[-1] == 1.0
         # Pictures owe nothing to what is still being compiled.
         assert not TwofoldLoop.uses_compiled
         empty_window._may_close = True
