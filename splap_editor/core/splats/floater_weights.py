@@ -1,4 +1,8 @@
-"""The floater finder's model: fitted by `python -m tests.benchmark.floaters --fit`, which prints its numbers."""
+"""The floater finder's model, fitted once on made scenes.
+
+`python -m tests.benchmark.floaters --fit` fits one of this form on the same objects and kinds of scene, of other seeds,
+and prints its numbers: they come out near these, not equal.
+"""
 
 # fmt: off
 CENTERS = (
