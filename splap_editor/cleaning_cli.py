@@ -5,12 +5,12 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from splap_editor.core.index_spaces import FileRow
 from splap_editor.stage_report import StageReport
 
 if TYPE_CHECKING:
     import numpy as np
 
+    from splap_editor.core.index_spaces import FileRow
     from splap_editor.core.place import Place
     from splap_editor.core.removal import PickedBox
     from splap_editor.engine.edit import Edit
@@ -126,7 +126,7 @@ def _place(options: argparse.Namespace, file: "SplatFile") -> "Place":
     return made
 
 
-def _points(file: "SplatFile", rows: list[FileRow]) -> "np.ndarray":
+def _points(file: "SplatFile", rows: "list[FileRow]") -> "np.ndarray":
     """(k, 3) centres of file rows."""
     import numpy as np
 

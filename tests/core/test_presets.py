@@ -15,7 +15,7 @@ PLACED = {"version": 1, "handles": [{"center": [0, 0, 0], "radius": 1}]}
 
 def test_the_papers_method_is_all_of_its_choices():
     options = recipe_from_json({**PLACED, "preset": "paper"}).options
-    assert options[GraphOptions] == GraphOptions(rule="paper", k=30, laplacian="robust")
+    assert options[GraphOptions] == GraphOptions(rule="paper", carriers="all", k=30, laplacian="robust")
     assert options[ArapOptions] == ArapOptions(kind="local-global", iterations=10)
     assert options[BbwOptions].blending == "linear"
     assert options[AdaptationOptions].adaptation == "paper"
@@ -24,7 +24,7 @@ def test_the_papers_method_is_all_of_its_choices():
 def test_what_a_recipe_says_beside_the_preset_counts():
     said = {**PLACED, "preset": "paper", "graph": {"k": 12}, "adaptation": "affine"}
     options = recipe_from_json(said).options
-    assert options[GraphOptions] == GraphOptions(rule="paper", k=12, laplacian="robust")
+    assert options[GraphOptions] == GraphOptions(rule="paper", carriers="all", k=12, laplacian="robust")
     assert options[AdaptationOptions].adaptation == "affine"
     assert options[ArapOptions].kind == "local-global"
 
@@ -38,7 +38,7 @@ def test_a_preset_is_written_as_what_it_means():
 
 def test_mends_stay_when_a_preset_is_taken():
     options = with_preset(OptionSet(GraphOptions(cut=((1, 2),), k=9)), "paper")
-    assert options[GraphOptions] == GraphOptions(rule="paper", k=30, laplacian="robust", cut=((1, 2),))
+    assert options[GraphOptions] == GraphOptions(rule="paper", carriers="all", k=30, laplacian="robust", cut=((1, 2),))
 
 
 def test_an_unknown_preset_is_refused_with_those_known():
