@@ -96,6 +96,14 @@ def frame_path(path: Path, frame: int, last: int) -> Path:
     return path.with_name(f"{stem}_{frame:0{max(4, len(str(last)))}d}{path.name[len(stem) :]}")
 
 
+def holds_all_frames(path: Path) -> bool:
+    """Whether frames under a name become one file of that name, not a numbered one each."""
+    if is_video(path):
+        return True
+    row = format_named(path)
+    return row is not None and (bool(row.writes_frames) or row.name == "gltf")
+
+
 def write_frames(
     poser: FramePoser,
     file: SplatFile,
@@ -127,12 +135,13 @@ def write_frames(
     -------
     list of Path
     """
-    if format_to_write(path).writes_frames:
-        _write_animation(poser, file, frames, path, progress)
-        return [path]
-    if format_to_write(path).name == "gltf":
-        farthest = _write_skin(poser, file, frames, path, progress)
-        say(f"{path.name} plays by linear blending: centres are off by up to {farthest:.2g} from the frames' own.")
+    row = format_to_write(path)
+    if holds_all_frames(path):
+        if row.writes_frames:
+            _write_animation(poser, file, frames, path, progress)
+        else:
+            farthest = _write_skin(poser, file, frames, path, progress)
+            say(f"{path.name} plays by linear blending: centres are off by up to {farthest:.2g} from the frames' own.")
         return [path]
     written = []
     for done, kernels in _posed(poser, frames, progress):

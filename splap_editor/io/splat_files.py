@@ -83,7 +83,9 @@ def read_splats(
     return replace(file, warnings=warnings + file.warnings)
 
 
-def losses_of_saving(file: SplatFile, row: SplatFormat, splats: Splats | None = None) -> list[str]:
+def losses_of_saving(
+    file: SplatFile, row: SplatFormat, splats: Splats | None = None, *, progress: Progress = no_progress
+) -> list[str]:
     """Say what saving a file's splats in a format loses, each as a sentence.
 
     Parameters
@@ -92,11 +94,13 @@ def losses_of_saving(file: SplatFile, row: SplatFormat, splats: Splats | None = 
     row : SplatFormat
     splats : Splats, optional
         The file's splats, deformed.
+    progress : Progress
+        May cancel.
     """
     if row.is_lossless or _is_kept(file, row):
         return []
     splats = file.splats if splats is None else splats
-    bare, n_unusable = bare_splats(splats, row.largest_degree)
+    bare, n_unusable = bare_splats(splats, row.largest_degree, progress)
     return losses(file, splats, bare, n_unusable, row)
 
 

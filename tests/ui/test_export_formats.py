@@ -1,52 +1,197 @@
-"""The export dialog tells the formats apart, and what each loses."""
+"""The dialogs of exports tell the formats apart, and what each loses."""
 
 from pathlib import Path
 
 import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from shiboken6 import isValid
 
+from splap_editor.app import Mailbox
 from splap_editor.core.splats.occupancy import occupancy_ellipses
+from splap_editor.core.timeline import Timeline
 from splap_editor.io.splat_files import read_splats
 from splap_editor.resources import resource
+from splap_editor.session.jobs import Job, Worker
 from splap_editor.session.scene import Scene
 from splap_editor.ui.dialogs.export_dialog import ExportDialog
+from splap_editor.ui.dialogs.frames_dialog import FramesDialog
+from splap_editor.ui.widgets.format_choice import FormatChoice
+
+from .conftest import WAIT_MS
+
+
+@pytest.fixture(scope="module")
+def flat_file():
+    return read_splats(resource("samples", "windmill_2dgs.ply"))
 
 
 @pytest.fixture
-def dialog(qtbot, tmp_path):
-    file = read_splats(resource("samples", "windmill_2dgs.ply"))
-    made = ExportDialog(None, tmp_path / "out.ply", Scene(file, occupancy_ellipses(file.splats)), {})
+def worker(qapp):
+    mailbox = Mailbox()
+    worker = Worker(mailbox.post)
+    yield worker
+    worker.close()
+
+
+@pytest.fixture
+def dialog(qtbot, tmp_path, flat_file, worker):
+    scene = Scene(flat_file, occupancy_ellipses(flat_file.splats))
+    made = ExportDialog(None, tmp_path / "out.ply", scene, {}, worker)
     made.show()
-    return made
+    yield made
+    if isValid(made):
+        made.reject()
 
 
-def choose(dialog: ExportDialog, name: str) -> None:
-    index = dialog.format_field.findData(name)
-    dialog.format_field.setCurrentIndex(index)
-    dialog.format_field.activated.emit(index)
+@pytest.fixture
+def ordered():
+    return []
+
+
+@pytest.fixture
+def frames_dialog(qtbot, flat_file, worker, ordered):
+    made = FramesDialog(None, flat_file, Timeline(), (80, 60), ordered.append, worker)
+    made.show()
+    yield made
+    if isValid(made):
+        made.reject()
+
+
+def choose(choice: FormatChoice, name: str) -> None:
+    """As a person does: the list is opened, and gone through by its keys."""
+    field = choice.field
+    steps = field.findData(name) - field.currentIndex()
+    for _ in range(abs(steps)):
+        QTest.keyClick(field, Qt.Key.Key_Down if steps > 0 else Qt.Key.Key_Up)
+
+
+def wait_told(qtbot, choice: FormatChoice) -> None:
+    qtbot.waitUntil(lambda: choice.is_told, timeout=WAIT_MS)
+
+
+def held_up(worker: Worker):
+    """Something that the worker does until it is let go."""
+    held = []
+
+    def wait(job: Job) -> None:
+        while not held:
+            job.report(0.0)
+
+    worker.submit(Job("wait", "", wait))
+    return lambda: held.append(True)
 
 
 def test_a_file_of_two_scales_says_who_reads_it_until_it_gets_a_third(dialog):
-    assert "SuperSplat" in dialog.losses.text() and dialog.third_scale.isVisible()
-    dialog.third_scale.setChecked(True)
-    assert not dialog.losses.isVisible() and dialog.as_3dgs
+    choice = dialog.choice
+    assert "SuperSplat" in choice.losses.text() and choice.third_scale.isVisible()
+    QTest.mouseClick(choice.third_scale, Qt.MouseButton.LeftButton, pos=choice.third_scale.rect().center() / 4)
+    assert not choice.losses.isVisible() and dialog.as_3dgs
 
 
 @pytest.mark.parametrize(("name", "ending"), [("spz", ".spz"), ("sog", ".sog"), ("gltf", ".glb")])
-def test_a_format_chosen_changes_the_ending_and_says_what_is_lost(dialog, name, ending, tmp_path):
-    choose(dialog, name)
+def test_a_format_chosen_changes_the_ending_and_says_what_is_lost(dialog, qtbot, name, ending, tmp_path):
+    choose(dialog.choice, name)
     assert dialog.path == tmp_path / f"out{ending}"
-    assert "Lost: Flat splats" in dialog.losses.text()
-    assert not dialog.third_scale.isVisible() and not dialog.as_3dgs and dialog.column_names == ()
-    choose(dialog, "compressed-ply")
+    wait_told(qtbot, dialog.choice)
+    assert "Lost: Flat splats" in dialog.choice.losses.text()
+    assert not dialog.choice.third_scale.isVisible() and not dialog.as_3dgs and dialog.column_names == ()
+    choose(dialog.choice, "compressed-ply")
     assert dialog.path == tmp_path / "out.compressed.ply"
-    choose(dialog, "ply")
+    choose(dialog.choice, "ply")
     assert dialog.path == tmp_path / "out.ply"
 
 
-def test_an_ending_typed_chooses_its_format_and_one_only_read_is_refused(dialog, tmp_path):
+def test_an_ending_typed_chooses_its_format_and_one_only_read_is_refused(dialog, qtbot, tmp_path):
     dialog.path_field.setText(str(tmp_path / "out.sog"))
-    assert dialog.format_field.currentData() == "sog" and dialog.accept_button.isEnabled()
+    assert dialog.choice.field.currentData() == "sog"
+    qtbot.waitUntil(dialog.accept_button.isEnabled, timeout=WAIT_MS)
     dialog.path_field.setText(str(tmp_path / "out.splat"))
     assert not dialog.accept_button.isEnabled()
     assert "only read" in dialog.note.text()
     assert Path(dialog.path).suffix == ".splat"
+
+
+def test_a_format_chosen_without_a_name_goes_by_the_one_suggested(dialog, tmp_path):
+    dialog.path_field.clear()
+    choose(dialog.choice, "spz")
+    assert dialog.path == tmp_path / "out.spz"
+
+
+def test_nothing_is_saved_before_it_is_said_what_that_loses_and_only_the_format_chosen_last_is_worked_out(
+    dialog, qtbot, worker
+):
+    go_on = held_up(worker)
+    choose(dialog.choice, "gltf")
+    assert "Working out" in dialog.choice.losses.text() and not dialog.accept_button.isEnabled()
+    # A PLY loses nothing, so that there is nothing to wait for.
+    choose(dialog.choice, "ply")
+    assert dialog.accept_button.isEnabled()
+    choose(dialog.choice, "spz")
+    go_on()
+    qtbot.waitUntil(dialog.accept_button.isEnabled, timeout=WAIT_MS)
+    assert "Numbers are rounded" in dialog.choice.losses.text()
+    assert set(dialog.choice._losses) == {"ply", "spz"}
+
+
+def test_losses_that_cannot_be_told_keep_nobody_from_saving(dialog, qtbot, monkeypatch):
+    def fails(*arguments, **more):
+        raise MemoryError("no room")
+
+    monkeypatch.setattr("splap_editor.ui.widgets.format_choice.losses_of_saving", fails)
+    choose(dialog.choice, "spz")
+    qtbot.waitUntil(dialog.accept_button.isEnabled, timeout=WAIT_MS)
+    assert "no room" in dialog.choice.losses.text()
+
+
+def test_a_dialog_closed_meanwhile_hears_nothing_more(qtbot, flat_file, worker):
+    go_on = held_up(worker)
+    made = FramesDialog(None, flat_file, Timeline(), (80, 60), lambda order: None, worker)
+    made.show()
+    made.kind.setCurrentIndex(made.kind.findData("splats"))
+    choose(made.choice, "sog")
+    heard = []
+    made.choice.told.connect(lambda: heard.append(True))
+    made.reject()
+    go_on()
+    qtbot.waitUntil(lambda: not worker.is_busy(), timeout=WAIT_MS)
+    assert heard == []
+
+
+def test_frames_of_a_format_that_loses_something_say_so_before_a_name_is_asked_for(frames_dialog, qtbot):
+    assert not frames_dialog.choice.isVisible()
+    frames_dialog.kind.setCurrentIndex(frames_dialog.kind.findData("splats"))
+    choose(frames_dialog.choice, "spz")
+    wait_told(qtbot, frames_dialog.choice)
+    assert "Lost: Flat splats" in frames_dialog.choice.losses.text() and frames_dialog.choice.losses.isVisible()
+
+
+def test_a_name_of_another_format_shows_its_losses_and_is_taken_when_it_comes_again(
+    frames_dialog, qtbot, ordered, tmp_path
+):
+    frames_dialog.kind.setCurrentIndex(frames_dialog.kind.findData("splats"))
+    frames_dialog.export_to(tmp_path / "out.ksplat")
+    assert ordered == [] and "only read" in frames_dialog.note.text()
+    frames_dialog.export_to(tmp_path / "out.glb")
+    assert ordered == [] and frames_dialog.choice.format.name == "gltf"
+    wait_told(qtbot, frames_dialog.choice)
+    assert "Lost: Flat splats" in frames_dialog.choice.losses.text()
+    frames_dialog.export_to(tmp_path / "out.glb")
+    assert [order.path.name for order in ordered] == ["out.glb"]
+
+
+def test_one_file_of_all_frames_says_that_it_replaces_another(frames_dialog, ordered, tmp_path):
+    held = tmp_path / "out.mp4"
+    held.write_bytes(b"")
+    frames_dialog.kind.setCurrentIndex(frames_dialog.kind.findData("turntable"))
+    frames_dialog.export_to(held)
+    assert ordered == [] and "exists" in frames_dialog.note.text()
+    frames_dialog.export_to(held)
+    assert [order.path for order in ordered] == [held]
+
+
+def test_frames_of_flat_splats_can_have_a_third_scale(frames_dialog, ordered, tmp_path):
+    frames_dialog.kind.setCurrentIndex(frames_dialog.kind.findData("splats"))
+    frames_dialog.choice.third_scale.setChecked(True)
+    frames_dialog.export_to(tmp_path / "out.ply")
+    assert ordered[0].as_3dgs

@@ -197,7 +197,7 @@ def test_frames_are_exported_from_the_dialog(driver, qtbot, tmp_path):
     keyed_strip(driver)
     driver.key(Qt.Key.Key_E, CONTROL | SHIFT)
     dialog = next(w for w in QApplication.topLevelWidgets() if isinstance(w, FramesDialog))
-    assert dialog.kind.currentData() == "ply" and dialog.last.value() == 10
+    assert dialog.kind.currentData() == "splats" and dialog.last.value() == 10
     dialog.first.setValue(9)
     dialog.export_to(tmp_path / "out.ply")
     qtbot.waitUntil(lambda: driver.window.toast.text.startswith("Exported 2 frames"), timeout=WAIT_MS)

@@ -105,7 +105,8 @@ class FileActions:
         """Ask where to, and write what is on screen."""
         scene = self._session.shown_scene
         suggested = folder_to_write(scene.file.path) / f"{scene.file.path.stem}_edited.ply"
-        dialog = ExportDialog(self._window, suggested, scene, column_lacks(scene, self._session.bound))
+        lacks = column_lacks(scene, self._session.bound)
+        dialog = ExportDialog(self._window, suggested, scene, lacks, self._session.detail_worker)
         dialog.accepted.connect(lambda: self._export(dialog))
         dialog.rejected.connect(self._forget_after_export)
         dialog.open()

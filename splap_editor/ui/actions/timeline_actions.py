@@ -176,14 +176,19 @@ class TimelineActions(QObject):
         self.player.stop()
         scene, projection = self._session.shown_scene, self._viewport.projection
         size = projection.width, projection.height
-        FramesDialog(self._window, scene.file.path, scene.edit.timeline, size, self.export_frames).open()
+        threads = self._session.detail_worker
+        FramesDialog(self._window, scene.file, scene.edit.timeline, size, self.export_frames, threads).open()
 
     def export_frames(self, order: FrameOrder) -> None:
         """Write frames in the background."""
 
-        def done(written: list[Path]) -> None:
-            n = len(written)
-            self._toast.say(f"Exported {n} frames, {written[0].name} and so on." if n > 1 else "Exported 1 frame.")
+        def done(written: list[Path], note: str) -> None:
+            n = len(order.frames)
+            if len(written) < n:
+                text = f"Exported {n} frames in {written[0].name}."
+            else:
+                text = f"Exported {n} frames, {written[0].name} and so on." if n > 1 else "Exported 1 frame."
+            self._toast.say(f"{text} {note}".rstrip())
 
         def failed(error: Exception) -> None:
             self._toast.fail(f"The frames were not exported: {sentence(error)}")

@@ -6,8 +6,6 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
-    QCheckBox,
-    QComboBox,
     QDialog,
     QDialogButtonBox,
     QFileDialog,
@@ -19,28 +17,38 @@ from PySide6.QtWidgets import (
 )
 
 from splap_editor.io.formats.table import FORMATS, SplatFormat, format_named, format_to_write
-from splap_editor.io.splat_files import FormatError, losses_of_saving, name_filter
+from splap_editor.io.splat_files import FormatError, name_filter
+from splap_editor.session.jobs import Threads
 from splap_editor.session.scene import Scene
 from splap_editor.ui.theme import STEP
 from splap_editor.ui.widgets.columns_list import ColumnsList
+from splap_editor.ui.widgets.format_choice import FormatChoice
 from splap_editor.ui.widgets.number_field import set_tone
 from splap_editor.ui.widgets.plain_text import PlainLabel
 
-_THIRD_SCALE = "Add a thin third scale, for programs that only know 3DGS"
-_ONLY_2DGS = (
-    "Two scales per splat, as 2DGS trainers write: read by 2DGS viewers and this editor. SuperSplat, splat-transform "
-    "and most others want three; tick the box below for them."
-)
-
 
 class ExportDialog(QDialog):
-    """Asks for a path; says before anything is written what stands in the way."""
+    """Asks for a path; says before anything is written what stands in the way.
 
-    def __init__(self, parent: QWidget, suggested: Path, scene: Scene, lacks: Mapping[str, str]) -> None:
+    Parameters
+    ----------
+    parent : QWidget
+    suggested : Path
+        The path at first.
+    scene : Scene
+    lacks : dict
+        As of `ColumnsList`.
+    threads : Threads
+        Where it is worked out what a format loses.
+    """
+
+    def __init__(
+        self, parent: QWidget | None, suggested: Path, scene: Scene, lacks: Mapping[str, str], threads: Threads
+    ) -> None:
         super().__init__(parent)
         self.setWindowTitle("Export")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        self._source = scene.file.path
+        self._source, self._suggested = scene.file.path, suggested
         self.path_field = QLineEdit(str(suggested))
         self.path_field.setMinimumWidth(420)
         browse = QPushButton("Browse…")
@@ -50,22 +58,11 @@ class ExportDialog(QDialog):
         line.addWidget(self.path_field, 1)
         line.addWidget(browse)
         n = scene.splats.n_splats
-        self._file = scene.file
-        self._told: dict[str, list[str]] = {}
-        self.facts = PlainLabel(wordWrap=True)
-        self.facts.setProperty("tone", "quiet")
-        self._of_ply = f"{n:,} splats in the file's own order and layout; rows that did not move stay as they are."
-        self.format_field = QComboBox()
-        for row in FORMATS.values():
-            if row.can_be_written:
-                self.format_field.addItem(f"{row.title} (*{row.suffixes[0]})", row.name)
-        self.format_field.activated.connect(self._on_format_chosen)
-        self.losses = PlainLabel(wordWrap=True)
-        set_tone(self.losses, "warning")
+        of_ply = f"{n:,} splats in the file's own order and layout; rows that did not move stay as they are."
+        self.choice = FormatChoice(scene.file, threads, of_ply)
+        self.choice.chosen.connect(self._on_format_chosen)
+        self.finished.connect(self.choice.give_up)
         self.note = PlainLabel(wordWrap=True)
-        self.third_scale = QCheckBox(_THIRD_SCALE)
-        self._is_flat = scene.splats.n_scales == 2
-        self.third_scale.toggled.connect(self._check)
         self.columns = ColumnsList(lacks)
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
         self.accept_button = buttons.addButton("Export", QDialogButtonBox.ButtonRole.AcceptRole)
@@ -75,16 +72,14 @@ class ExportDialog(QDialog):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(5 * STEP, 5 * STEP, 5 * STEP, 4 * STEP)
         layout.setSpacing(3 * STEP)
-        layout.addWidget(self.facts)
         layout.addLayout(line)
-        layout.addWidget(self.format_field)
-        layout.addWidget(self.losses)
-        layout.addWidget(self.third_scale)
+        layout.addWidget(self.choice)
         layout.addWidget(self.columns)
         layout.addWidget(self.note)
         layout.addStretch(1)
         layout.addWidget(buttons)
         self.path_field.textChanged.connect(self._check)
+        self.choice.told.connect(self._check)
         self._check()
 
     @property
@@ -98,7 +93,7 @@ class ExportDialog(QDialog):
     @property
     def as_3dgs(self) -> bool:
         """Whether a third scale is added."""
-        return self.third_scale.isVisibleTo(self) and self.third_scale.isChecked()
+        return self.choice.as_3dgs
 
     @property
     def format(self) -> SplatFormat:
@@ -112,14 +107,15 @@ class ExportDialog(QDialog):
         return self.columns.names if self.format.is_lossless else ()
 
     def _check(self) -> None:
-        self._show_format()
+        self.choice.show_format(self.format)
+        self.columns.setVisible(self.format.is_lossless)
         try:
             text, tone, is_possible = self._verdict()
         except OSError as error:
             text, tone, is_possible = f"{error.strerror or error}.", "danger", False
         self.note.setText(text)
         set_tone(self.note, tone)
-        self.accept_button.setEnabled(is_possible)
+        self.accept_button.setEnabled(is_possible and self.choice.is_told)
 
     def _verdict(self) -> tuple[str, str, bool]:
         """What to say of the path, in which tone, and whether it can be written."""
@@ -141,24 +137,9 @@ class ExportDialog(QDialog):
             return "This is the file that is open; it will be replaced.", "warning", True
         return "This file exists and will be replaced.", "warning", True
 
-    def _show_format(self) -> None:
-        """Say what the format of the name is, who reads it, and what it cannot hold of this file."""
-        row = self.format
-        self.format_field.setCurrentIndex(self.format_field.findData(row.name))
-        self.third_scale.setVisible(self._is_flat and row.is_lossless)
-        self.columns.setVisible(row.is_lossless)
-        if row.name not in self._told:
-            self._told[row.name] = losses_of_saving(self._file, row)
-        flat = self._is_flat and row.is_lossless and not self.third_scale.isChecked()
-        told = [_ONLY_2DGS] if flat else [f"Lost: {loss}" for loss in self._told[row.name]]
-        self.losses.setText("\n".join(told))
-        self.losses.setVisible(bool(told))
-        readers = f" Read by {row.readers}." if row.readers else ""
-        self.facts.setText((self._of_ply if row.is_lossless else f"{row.title}.") + readers)
-
-    def _on_format_chosen(self, index: int) -> None:
-        row = FORMATS[self.format_field.itemData(index)]
-        path = self.path
+    def _on_format_chosen(self, name: str) -> None:
+        row = FORMATS[name]
+        path = self.path if self.path.name else self._suggested
         held = next((s for s in self.format.suffixes if path.name.lower().endswith(s)), path.suffix)
         stem = path.name[: len(path.name) - len(held)] if held else path.name
         self.path_field.setText(str(path.with_name(stem + row.suffixes[0])))

@@ -18,17 +18,22 @@ from PySide6.QtWidgets import (
 )
 
 from splap_editor.core.timeline import LAST_FRAME, Timeline
-from splap_editor.io.splat_files import name_filter
+from splap_editor.engine.frames import holds_all_frames
+from splap_editor.io.formats.table import FORMATS, format_to_write
+from splap_editor.io.ply import SplatFile
+from splap_editor.io.splat_files import FormatError, name_filter
 from splap_editor.io.video import VIDEOS
+from splap_editor.session.jobs import Threads
 from splap_editor.ui.actions.file_actions import folder_to_write
 from splap_editor.ui.theme import STEP
 from splap_editor.ui.timeline.frame_export import FrameOrder
-from splap_editor.ui.widgets.number_field import NumberField
+from splap_editor.ui.widgets.format_choice import FormatChoice
+from splap_editor.ui.widgets.number_field import NumberField, set_tone
 from splap_editor.ui.widgets.options_form import form_label
 from splap_editor.ui.widgets.plain_text import PlainLabel
 from splap_editor.viewport.screenshot import LARGEST_PX
 
-KINDS = {"ply": "A PLY for each frame", "pictures": "A picture of each frame", "turntable": "Pictures all round"}
+KINDS = {"splats": "The splats of each frame", "pictures": "A picture of each frame", "turntable": "Pictures all round"}
 N_ROUND = 72
 
 _SPLATS = f"Splats ({name_filter(to_write=True)})"
@@ -36,32 +41,37 @@ _PICTURES = f"PNG pictures or a video (*.png {' '.join(f'*{ending}' for ending i
 
 
 class FramesDialog(QDialog):
-    """Asks what, which frames and how large, then for a name.
+    """Asks what, which frames and how large, then for a name; of splats it says first what their format loses.
 
     Parameters
     ----------
-    source : Path
-        The open PLY.
+    file : SplatFile
+        The open file.
     timeline : Timeline
         Without keys only the turntable is of use, and offered first.
     size : (int, int)
         Of pictures at first: that of the viewport.
     order : callable
         Given a `FrameOrder`.
+    threads : Threads
+        Where it is worked out what a format loses.
     """
 
     def __init__(
         self,
         parent: QWidget,
-        source: Path,
+        file: SplatFile,
         timeline: Timeline,
         size: tuple[int, int],
         order: Callable[[FrameOrder], None],
+        threads: Threads,
     ) -> None:
         super().__init__(parent)
         self.setWindowTitle("Export frames")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        self._source, self._order = source, order
+        self._source, self._order = file.path, order
+        self._name: Path | None = None
+        self._replaced: Path | None = None
         self.kind = QComboBox()
         for kind, text in KINDS.items():
             self.kind.addItem(text, kind)
@@ -75,8 +85,14 @@ class FramesDialog(QDialog):
         self.width_field.show_value(size[0])
         self.height_field.show_value(size[1])
         self.transparent = QCheckBox("Transparent background")
+        self.choice = FormatChoice(file, threads, "A file for each frame, in the order and layout of the one open.")
+        self.choice.chosen.connect(self._on_format_chosen)
+        self.choice.told.connect(self._show_whether_possible)
+        self.finished.connect(self.choice.give_up)
+        self.note = PlainLabel(wordWrap=True)
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
-        buttons.addButton("Export…", QDialogButtonBox.ButtonRole.AcceptRole).setDefault(True)
+        self.accept_button = buttons.addButton("Export…", QDialogButtonBox.ButtonRole.AcceptRole)
+        self.accept_button.setDefault(True)
         buttons.accepted.connect(self._ask_for_path)
         buttons.rejected.connect(self.reject)
         self._rows: dict[str, tuple[QWidget, ...]] = {}
@@ -92,6 +108,9 @@ class FramesDialog(QDialog):
         layout.setContentsMargins(5 * STEP, 5 * STEP, 5 * STEP, 4 * STEP)
         layout.setSpacing(4 * STEP)
         layout.addLayout(grid)
+        layout.addWidget(self.choice)
+        layout.addWidget(self.note)
+        layout.addStretch(1)
         layout.addWidget(buttons)
         self.kind.currentIndexChanged.connect(self._show)
         self.kind.setCurrentIndex(0 if timeline.keys else 1 if timeline.camera_keys else 2)
@@ -109,31 +128,71 @@ class FramesDialog(QDialog):
 
     def _show(self) -> None:
         kind = self.kind.currentData()
-        shown = {"ply": ("frames",), "pictures": ("frames", "size", "transparent")}
+        shown = {"splats": ("frames",), "pictures": ("frames", "size", "transparent")}
         for name, widgets in self._rows.items():
             is_shown = name == "kind" or name in shown.get(kind, ("number", "size", "transparent"))
             for widget in widgets:
                 widget.setVisible(is_shown)
+        self.choice.setVisible(kind == "splats")
+        self._name = None
+        self._say("", "quiet")
+        self._show_whether_possible()
+
+    def _show_whether_possible(self) -> None:
+        self.accept_button.setEnabled(self.kind.currentData() != "splats" or self.choice.is_told)
+
+    def _say(self, text: str, tone: str) -> None:
+        self.note.setText(text)
+        set_tone(self.note, tone)
+        self.note.setVisible(bool(text))
+
+    def _on_format_chosen(self, name: str) -> None:
+        self.choice.show_format(FORMATS[name])
+        self._name = None
+        self._say("", "quiet")
 
     def _ask_for_path(self) -> None:
-        suffix = "ply" if self.kind.currentData() == "ply" else "png"
-        suggested = folder_to_write(self._source) / f"{self._source.stem}.{suffix}"
+        of_splats = self.kind.currentData() == "splats"
+        suffix = self.choice.format.suffixes[0] if of_splats else ".png"
+        suggested = self._name or folder_to_write(self._source) / f"{self._source.stem}{suffix}"
         dialog = QFileDialog(self.parentWidget(), "Name the frames", str(suggested))
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
-        # Each frame gets a number of its own: the name itself is never written.
+        # Most frames get a number of their own, and the name itself is not written; where it is, `_is_clear` says so.
         dialog.setOption(QFileDialog.Option.DontConfirmOverwrite)
-        dialog.setNameFilter(_SPLATS if suffix == "ply" else _PICTURES)
-        dialog.setDefaultSuffix(suffix)
+        dialog.setNameFilter(_SPLATS if of_splats else _PICTURES)
+        dialog.setDefaultSuffix(suffix[1:])
         dialog.fileSelected.connect(lambda name: self.export_to(Path(name)))
         dialog.open()
 
     def export_to(self, path: Path) -> None:
-        """Order the frames under a name."""
+        """Order the frames under a name; what is to be known of the name first is said instead, once."""
         QSettings().setValue("files/folder", str(path.parent))
-        first, last = sorted((int(self.first.value()), int(self.last.value())))
         kind = self.kind.currentData()
+        if not self._is_clear(path):
+            self._name = path
+            return
+        first, last = sorted((int(self.first.value()), int(self.last.value())))
         frames = range(1, int(self.number.value()) + 1) if kind == "turntable" else range(first, last + 1)
         size = int(self.width_field.value()), int(self.height_field.value())
-        self._order(FrameOrder(kind, frames, path, size, self.transparent.isChecked()))
+        as_3dgs = self.choice.as_3dgs
+        self._order(FrameOrder(kind, frames, path, size, self.transparent.isChecked(), as_3dgs))
         self.accept()
+
+    def _is_clear(self, path: Path) -> bool:
+        """Whether all is said that is to be known of a name: what its format loses, and that a file is replaced."""
+        if self.kind.currentData() == "splats":
+            try:
+                row = format_to_write(path)
+            except FormatError as error:
+                self._say(str(error), "danger")
+                return False
+            if row.name != self.choice.format.name:
+                self.choice.show_format(row)
+                self._say(f"{path.name} is {row.title}: see above what that loses, then export.", "warning")
+                return False
+        if holds_all_frames(path) and path.exists() and path != self._replaced:
+            self._replaced = path
+            self._say(f"{path.name} exists: it is replaced when you export again.", "warning")
+            return False
+        return True

@@ -31,7 +31,7 @@ class FrameOrder:
     Parameters
     ----------
     kind : str
-        ``"ply"``, ``"pictures"`` or ``"turntable"``.
+        ``"splats"``, ``"pictures"`` or ``"turntable"``.
     frames : range
         Frames of the timeline; of a turntable, 1 to the number of pictures.
     path : Path
@@ -41,7 +41,7 @@ class FrameOrder:
     is_transparent : bool
         Pictures without a background.
     as_3dgs : bool
-        PLYs with a third scale.
+        PLYs of flat splats with a third scale.
     """
 
     kind: str
@@ -56,7 +56,7 @@ def submit_frames(
     session: Session,
     viewport: Viewport,
     order: FrameOrder,
-    done: Callable[[list[Path]], None],
+    done: Callable[[list[Path], str], None],
     failed: Callable[[Exception], None],
 ) -> Job:
     """Queue the export of frames as they are now; cancelling keeps the files that are whole.
@@ -69,7 +69,7 @@ def submit_frames(
         Its look and background are those of the pictures; its camera too, where the timeline has no camera keys.
     order : FrameOrder
     done : callable
-        Given the written files.
+        Given the written files, and what a format plays otherwise than the frames are.
     failed : callable
         Given what went wrong.
     """
@@ -77,18 +77,22 @@ def submit_frames(
     file, edit, surface, cache = scene.file, scene.edit, scene.surface, session.cache
     n_threads = session.n_threads
     serves = bound is not None and binds_like(bound.edit, edit)
-    desk = _Desk(scene.splats, viewport, order, scene) if order.kind != "ply" else None
+    desk = _Desk(scene.splats, viewport, order, scene) if order.kind != "splats" else None
 
     def poser(job: Job) -> FramePoser:
         if serves and edit.active_handles:
             return FramePoser(edit, bound)
         return frame_poser(surface, edit, cache=cache, progress=job.progress("binding"), run=side_by_side(n_threads))
 
+    said: list[str] = []
+
     def work(job: Job) -> list[Path]:
         poses = poser(job)
         if desk is None:
-            progress = job.progress("frames")
-            return write_frames(poses, file, order.frames, order.path, as_3dgs=order.as_3dgs, progress=progress)
+            progress, as_3dgs = job.progress("frames"), order.as_3dgs
+            return write_frames(
+                poses, file, order.frames, order.path, as_3dgs=as_3dgs, say=said.append, progress=progress
+            )
         return _draw(desk, order, poses, edit.timeline.fps, job)
 
     def ended(call: Callable[[], None]) -> None:
@@ -96,13 +100,13 @@ def submit_frames(
             desk.close()
         call()
 
-    title = {"ply": "Exporting frames", "pictures": "Drawing frames", "turntable": "Drawing a turntable"}[order.kind]
+    title = {"splats": "Exporting frames", "pictures": "Drawing frames", "turntable": "Drawing a turntable"}[order.kind]
     return session.worker.submit(
         Job(
             "frames",
             title,
             work,
-            done=lambda written: ended(lambda: done(written)),
+            done=lambda written: ended(lambda: done(written, " ".join(said))),
             failed=lambda error: ended(lambda: failed(error)),
             stopped=lambda: ended(lambda: None),
         )
