@@ -32,6 +32,7 @@ _KIND_OF = {
     "test_cli.py": "pure",
     "test_frames_cli.py": "offscreen",
     "test_contributing.py": "pure",
+    "test_house.py": "pure",
     "test_kinds.py": "pure",
     "test_readme.py": "pure",
     "test_warm_up.py": "offscreen",

@@ -131,7 +131,7 @@ class CropTool(Tool):
         self._is_dismissed = False
         self._options, self._numbers = context.held(CropOptions), context.held(CropNumbers)
         self._options.changed.connect(self._on_options)
-        self._numbers.changed.connect(self._on_numbers)
+        self._numbers.entered.connect(self._on_numbers)
         SceneFollower(context.session, self.drop, removed_changed=self._redraw, edit_changed=self._on_place)
 
     # Shape --------------------------------------------------------------------------------------------------------
@@ -268,7 +268,7 @@ class CropTool(Tool):
     def _show_numbers(self, shape: CropShape) -> None:
         place = self.context.session.shown_scene.edit.place
         values = (*placed_points(shape.center[None], place)[0], *(2.0 * place.scale * shape.halves))
-        self._numbers.set(CropNumbers(*(float(np.float32(value)) for value in values)))
+        self._numbers.show(CropNumbers(*(float(np.float32(value)) for value in values)))
 
     def _on_place(self) -> None:
         if self.shape is not None:
@@ -280,11 +280,7 @@ class CropTool(Tool):
         place = self.context.session.shown_scene.edit.place
         x, y, z, *sides = (getattr(self._numbers.value, name) for name in ("x", "y", "z", "width", "depth", "height"))
         center = file_points(np.array([[x, y, z]]), place)[0]
-        shape = self.shape.sized(center, np.array(sides) / place.scale)
-        was = np.concatenate([self.shape.center, self.shape.halves])
-        # Shown numbers are rounded to single precision; only what someone entered makes another shape.
-        if not np.allclose(np.concatenate([shape.center, shape.halves]), was, rtol=1e-6, atol=1e-9):
-            self.show(shape)
+        self.show(self.shape.sized(center, np.array(sides) / place.scale))
 
     # Drawing ------------------------------------------------------------------------------------------------------
 

@@ -106,14 +106,24 @@ class Hud:
 
 
 class Held(Generic[Options]):
-    """Options of one kind, in force for every tool that has them; `changed` tells of other ones."""
+    """Options of one kind, in force for every tool that has them.
+
+    `changed` tells of other ones, `entered` only of those that a tool does not say itself.
+    """
 
     def __init__(self, value: Options) -> None:
         self.value = value
         self.changed = Signal()
+        self.entered = Signal()
 
     def set(self, value: Options) -> None:
         """Put other options in force."""
+        if value != self.value:
+            self.show(value)
+            self.entered.emit()
+
+    def show(self, value: Options) -> None:
+        """Say what a tool has come to: forms follow, the tool is not told."""
         if value != self.value:
             self.value = value
             self.changed.emit()

@@ -14,10 +14,8 @@ ROOT = Path(__file__).resolve().parents[2]
 BASE = ("libc.so", "libm.so", "libpthread.so", "libdl.so", "librt.so", "libgcc_s.so", "ld-linux")
 
 
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the libraries are Linux's")
 def test_every_listed_library_is_here_where_the_tests_run():
-    if not sys.platform.startswith("linux"):
-        assert package_manager() is None
-        return
     assert [need.library for need in missing({need.use for need in needs()} - {"wayland"})] == []
 
 

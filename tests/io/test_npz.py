@@ -92,6 +92,7 @@ def test_no_flipped_bit_escapes_as_another_error(write):
     data = io.BytesIO()
     write(data, a=np.arange(30.0), b=np.arange(3))
     held = data.getvalue()
+    n_refused = 0
     for at in range(len(held)):
         for bit in (1, 0x20, 0x80):
             broken = held[:at] + bytes([held[at] ^ bit]) + held[at + 1 :]
@@ -100,4 +101,6 @@ def test_no_flipped_bit_escapes_as_another_error(write):
                 for name in file.names:
                     file.array(name)
             except (NpzError, OSError):
-                continue
+                n_refused += 1
+    # The arrays' bytes are guarded by their checksum; not each byte of the folders about them is read.
+    assert n_refused > len(held)
