@@ -6,13 +6,17 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QLabel
+from PySide6.QtWidgets import QApplication, QLabel, QWidget
 
+from splap_editor.core.adaptation.options import AdaptationOptions
 from splap_editor.core.arap.options import ArapOptions
+from splap_editor.core.deformers import DEFORMERS
 from splap_editor.core.handle_nodes import Region
+from splap_editor.core.options import options_of
 from splap_editor.core.pose import Pose
 from splap_editor.core.reach_options import ReachOptions
 from splap_editor.ui.panels.pose_form import PoseForm, euler_degrees, quat_of_euler
+from splap_editor.ui.widgets.choices import Choice
 from splap_editor.ui.widgets.number_field import NumberField, ScrubLabel
 from splap_editor.ui.widgets.options_form import OptionsForm
 
@@ -83,6 +87,23 @@ def test_an_options_form_gives_a_changed_copy(qtbot):
     assert form.findChild(NumberField, "tolerance").isHidden()
     assert not form.findChild(NumberField, "iterations").isHidden()
     assert len(told) == 1
+
+
+def test_every_form_offers_just_what_its_options_may_be(driver):
+    seen = set()
+    for form in driver.window.findChildren(OptionsForm):
+        for name, known in options_of(form.value).items():
+            editor = form.findChild(QWidget, name)
+            if isinstance(editor, Choice):
+                assert [editor.itemData(index) for index in range(editor.count())] == list(known.choices)
+            elif isinstance(editor, NumberField) and known.kind == "integer":
+                # A field has ends even where the option has none.
+                assert [editor.minimum(), editor.maximum()] == [known.least, min(known.most, 1e9)], name
+            elif isinstance(editor, NumberField):
+                factor = 100.0 if known.is_percent else 1.0
+                assert known.accepts(editor.minimum() / factor) and known.accepts(editor.maximum() / factor)
+            seen |= {(type(form.value), name)} if editor is not None else set()
+    assert (AdaptationOptions, "hops") in seen and {group for group, _ in seen} >= {row.options for row in DEFORMERS}
 
 
 def test_handle_list_renames_switches_resets_and_deletes(driver):

@@ -112,6 +112,11 @@ class OptionsForm(QWidget):
             self._editors[name] = editor
         self.show_value(value)
 
+    @property
+    def value(self) -> Any:
+        """What it shows."""
+        return self._value
+
     def show_value(self, value: Any) -> None:
         """Show a value without telling anyone."""
         self._value = value
