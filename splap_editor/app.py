@@ -19,6 +19,7 @@ from splap_editor.engine.cache import StageCache
 from splap_editor.first_start import FirstStart
 from splap_editor.installation.desktop_entry import APP_ID
 from splap_editor.session.autosave import Autosave
+from splap_editor.session.background_thread import leave
 from splap_editor.session.crash_report import CrashReport
 from splap_editor.session.documents import Documents
 from splap_editor.session.jobs import Job
@@ -99,7 +100,8 @@ def run(path: Path | None = None, *, tell: Callable[[float], None] = no_progress
     code = app.exec()
     signals.close()
     crash_report.close()
-    return 128 + told[0] if told else code
+    # The window is still there: a thread that has something to tell it must not outlive it.
+    return leave(128 + told[0] if told else code)
 
 
 def _tell_taskbar() -> None:

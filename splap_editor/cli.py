@@ -13,6 +13,7 @@ from splap_editor.cleaning_cli import add_clean, add_place
 from splap_editor.core.graph.options import EDGE_OPTIONS, GraphOptions
 from splap_editor.core.options import options_of
 from splap_editor.installation import commands as installation
+from splap_editor.session.background_thread import leave
 from splap_editor.stage_report import ShareLine, StageReport
 
 if TYPE_CHECKING:
@@ -41,7 +42,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return EXIT_REFUSED
     except KeyboardInterrupt:
         print("splap-editor: stopped; no file was left half-written", file=sys.stderr)
-        return EXIT_REFUSED
+        # What the window or a deformer had going in the background is no longer wanted.
+        return leave(EXIT_REFUSED)
 
 
 def _with_command(arguments: list[str]) -> list[str]:

@@ -15,7 +15,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import IO, Any
 
@@ -28,6 +28,7 @@ from splap_editor.core.adaptation.kernel_binding import RestArrays
 from splap_editor.core.twofold_loop import TwofoldLoop
 from splap_editor.engine.cache import default_cache_folder
 from splap_editor.resources import resource
+from splap_editor.session.background_thread import BackgroundThread
 
 MOST_PROCESSES = 4
 
@@ -122,7 +123,7 @@ class Compilation:
         self._failed = False
         self._lock = threading.Lock()
         self._processes: list[subprocess.Popen] = []
-        self._threads: list[threading.Thread] = []
+        self._threads: list[BackgroundThread] = []
 
     def start(self, n_processes: int | None = None) -> None:
         """Start processes, or more of them; None: as many as there are cores."""
@@ -130,7 +131,7 @@ class Compilation:
         for _ in range(n_wanted - len(self._processes)):
             pipe = subprocess.PIPE
             process = subprocess.Popen(self._command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, text=True)
-            thread = threading.Thread(target=self._serve, args=(process,), name="splap-compile", daemon=True)
+            thread = BackgroundThread(partial(self._serve, process), name="splap-compile", stop=self._stop)
             self._processes.append(process)
             self._threads.append(thread)
             thread.start()
@@ -170,12 +171,15 @@ class Compilation:
 
     def close(self) -> None:
         """End the processes, whatever they are doing."""
+        self._stop()
+        for thread in self._threads:
+            thread.join()
+
+    def _stop(self) -> None:
         with self._lock:
             self._queue.clear()
         for process in self._processes:
             process.terminate()
-        for thread in self._threads:
-            thread.join()
 
     def _serve(self, process: subprocess.Popen[str]) -> None:
         try:

@@ -18,7 +18,8 @@ import pytest
 
 from tests.kinds import KINDS, kind_of, rank
 
-_THREAD_GRACE_S = 5.0
+_THREAD_GRACE_S = 60.0
+"""A loop that is compiled hears of nothing until that is done."""
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from time import monotonic
 
 from splap_editor.io.session_file import write_session_file
+from splap_editor.session.background_thread import BackgroundThread, joined
 from splap_editor.session.documents import Documents
 from splap_editor.session.jobs import Post
 from splap_editor.session.recovery import LeftBehind, Orphan, RecoverySlot, left_behind, new_slot, recovery_folder
@@ -15,6 +16,9 @@ from splap_editor.session.signals import Signal
 
 DELAY_S = 0.25
 """The write itself takes the rest of the half second after which an edit is safe."""
+
+WRITE_TIMEOUT_S = 60.0
+"""How long closing waits for a write to a disk that does not answer."""
 
 
 class Autosave:
@@ -53,7 +57,7 @@ class Autosave:
         self._keeps = False
         self._has_failed = False
         self._wake = threading.Condition()
-        self._thread = threading.Thread(target=self._run, name="splap-autosave", daemon=True)
+        self._thread = BackgroundThread(self._run, name="splap-autosave", stop=partial(self._end, keep=True))
         self._thread.start()
         documents.changed.connect(self._on_changed)
 
@@ -74,16 +78,23 @@ class Autosave:
             Write what is not written yet, and leave it for the next start: nobody was asked about it.
         """
         self._documents.changed.disconnect(self._on_changed)
-        with self._wake:
-            self._is_closing, self._keeps = True, keep
-            self._wake.notify()
-        self._thread.join()
+        self._end(keep=keep)
+        if not joined((self._thread,), WRITE_TIMEOUT_S):
+            # It is in the middle of a write that blocks; the lock says so as long as the process lives.
+            return
         for slot in (self._slot, self._adopted):
             if slot is not None and keep and slot.path.exists():
                 slot.lock.release()
             elif slot is not None:
                 slot.remove()
         self._slot = self._adopted = None
+
+    def _end(self, *, keep: bool) -> None:
+        with self._wake:
+            # Once it is closed nothing else counts any more.
+            if not self._is_closing:
+                self._is_closing, self._keeps = True, keep
+            self._wake.notify()
 
     def _adopt(self, slot: RecoverySlot) -> None:
         with self._wake:

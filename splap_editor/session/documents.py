@@ -10,7 +10,7 @@ from splap_editor.core.progress import Progress, no_progress
 from splap_editor.engine.removal import Finder
 from splap_editor.io.session_file import content_hash, read_session_file, write_session_file
 from splap_editor.io.session_specs import SessionFile
-from splap_editor.session.jobs import Job, Post, Starter, Worker
+from splap_editor.session.jobs import Job, Post, Starter, Worker, close_all
 from splap_editor.session.latest_job import LatestJob
 from splap_editor.session.saved_state import Look, SavedState, restore_scene, saved_state, session_file_of
 from splap_editor.session.scene import Scene
@@ -108,10 +108,10 @@ class Documents:
         )
 
     def close(self) -> None:
-        """Finish saving and join the worker."""
-        self._openings.close()
+        """Finish saving and join the workers, as far as they come to an end in time."""
+        self._openings.stop()
         self._is_written.wait(SAVE_TIMEOUT_S)
-        self.worker.close()
+        close_all((self._openings, self.worker))
 
     # ---------------------------------------------------------------- state
 

@@ -4,20 +4,19 @@ import threading
 import traceback
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import partial
 from time import monotonic
 from typing import Any
 
 from splap_editor.core.progress import Cancelled, Progress
+from splap_editor.session.background_thread import LEAVE_SECONDS, BackgroundThread, joined
 
 Post = Callable[[Callable[[], None]], None]
 """Runs a callable on the main thread, soon; called from the worker."""
 
 REPORT_SECONDS = 0.05
-LEAVE_SECONDS = 2.0
-"""How long closing waits for what blocks on a file; it ends with the process."""
 
 
 @dataclass(eq=False)
@@ -83,7 +82,8 @@ class Threads(ABC):
 
     Compiled loops of the engine are serial and let go of Python's lock, so
     several threads may run side by side. Results, failures and progress reach
-    the main thread through ``post``, in order.
+    the main thread through ``post``, in order. A job that is cancelled ends at
+    its next report.
 
     Parameters
     ----------
@@ -94,7 +94,8 @@ class Threads(ABC):
     """
 
     def __init__(self, post: Post, *, name: str) -> None:
-        self.post = post
+        self._post = post
+        self._is_heard = True
         self.on_progress: Callable[[Job], None] = lambda job: None
         self.on_busy: Callable[[Job | None], None] = lambda job: None
         self._name = name
@@ -104,9 +105,17 @@ class Threads(ABC):
     def submit(self, job: Job) -> Job:
         """Take a job; where only the newest of its kind matters, a `LatestJob` does that."""
 
-    @abstractmethod
     def close(self) -> None:
-        """Cancel everything and join what runs."""
+        """Cancel everything and join what comes to an end in time; the rest ends with the process, unheard."""
+        close_all((self,))
+
+    def stop(self) -> None:
+        """Cancel everything, and begin no more; waits for nothing."""
+        self.cancel()
+
+    @abstractmethod
+    def threads(self) -> tuple[threading.Thread, ...]:
+        """Threads that run."""
 
     @abstractmethod
     def _jobs(self) -> tuple[Job, ...]:
@@ -123,6 +132,15 @@ class Threads(ABC):
         """Whether a job of these kinds (or any) waits or runs and is not cancelled."""
         with self._wake:
             return any(not job.is_cancelled and (not kinds or job.kind in kinds) for job in self._jobs())
+
+    def post(self, call: Callable[[], None]) -> None:
+        """Run a callable on the main thread, soon, if anybody is left there to hear of it."""
+        if self._is_heard:
+            self._post(call)
+
+    def fall_silent(self) -> None:
+        """Tell the main thread nothing any more."""
+        self._is_heard = False
 
     def tell_progress(self, job: Job) -> None:
         """Pass a job's progress to the main thread."""
@@ -167,7 +185,7 @@ class Worker(Threads):
         self._queue: deque[Job] = deque()
         self._running: Job | None = None
         self._closing = False
-        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self._thread = BackgroundThread(self._run, name=name, stop=self.stop)
         self._thread.start()
 
     def submit(self, job: Job) -> Job:
@@ -178,14 +196,17 @@ class Worker(Threads):
             self._wake.notify()
         return job
 
-    def close(self, timeout: float = 30.0) -> None:
-        """Cancel everything and join the thread."""
+    def stop(self) -> None:
+        """Cancel everything, and begin no more; waits for nothing."""
         with self._wake:
             self._closing = True
             for job in self._jobs():
                 job.cancel()
             self._wake.notify()
-        self._thread.join(timeout)
+
+    def threads(self) -> tuple[threading.Thread, ...]:
+        """The one thread."""
+        return (self._thread,)
 
     def _jobs(self) -> tuple[Job, ...]:
         return (*(() if self._running is None else (self._running,)), *self._queue)
@@ -213,35 +234,28 @@ class Worker(Threads):
 class Starter(Threads):
     """A thread of its own for each job, begun at once: no file that is opened waits for one that is slow or blocked.
 
-    A job that is cancelled ends at its next report. Until then it holds on to
-    what it works on, but nobody hears of it any more.
+    Until a job that is cancelled ends it holds on to what it works on, but
+    nobody hears of it any more.
     """
 
     def __init__(self, post: Post, *, name: str) -> None:
-        super().__init__(self._post_while_open, name=name)
-        self._post = post
-        self._is_open = True
+        super().__init__(post, name=name)
         self._running: dict[Job, threading.Thread] = {}
 
     def submit(self, job: Job) -> Job:
         """Start a job."""
         job._worker = self
-        thread = threading.Thread(target=self._run, args=(job,), name=self._name, daemon=True)
+        thread = BackgroundThread(partial(self._run, job), name=self._name, stop=job.cancel)
         with self._wake:
             self._running[job] = thread
         self._tell_busy()
         thread.start()
         return job
 
-    def close(self) -> None:
-        """Cancel everything and join what comes to an end in time; the rest ends with the process, unheard."""
-        self.cancel()
-        end = monotonic() + LEAVE_SECONDS
+    def threads(self) -> tuple[threading.Thread, ...]:
+        """Threads of the jobs that run."""
         with self._wake:
-            threads = tuple(self._running.values())
-        for thread in threads:
-            thread.join(max(end - monotonic(), 0.0))
-        self._is_open = False
+            return tuple(self._running.values())
 
     def _jobs(self) -> tuple[Job, ...]:
         return tuple(self._running)
@@ -262,6 +276,12 @@ class Starter(Threads):
 
         self.post(tell)
 
-    def _post_while_open(self, call: Callable[[], None]) -> None:
-        if self._is_open:
-            self._post(call)
+
+def close_all(several: Iterable[Threads]) -> None:
+    """Close all of them at once: none waits for another, and all together take no longer than one."""
+    several = tuple(several)
+    for threads in several:
+        threads.stop()
+    joined((thread for threads in several for thread in threads.threads()), LEAVE_SECONDS)
+    for threads in several:
+        threads.fall_silent()

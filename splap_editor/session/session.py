@@ -12,7 +12,7 @@ from splap_editor.session.depictor import Depictor, Unseen
 from splap_editor.session.drag import Drag
 from splap_editor.session.edit_file import read_edit
 from splap_editor.session.history import History
-from splap_editor.session.jobs import Post, Starter, Worker
+from splap_editor.session.jobs import Post, Starter, Worker, close_all
 from splap_editor.session.latest_job import LatestJob
 from splap_editor.session.scene import Scene
 from splap_editor.session.scene_follower import SceneFollower
@@ -70,9 +70,8 @@ class Session:
         SceneFollower(self, self._edits.drop, edit_changed=self._runner.advance, preview_changed=self._runner.advance)
 
     def close(self) -> None:
-        """Cancel everything and join the workers."""
-        for worker in (self._openings, self.worker, self.view_worker, self.detail_worker):
-            worker.close()
+        """Cancel everything and join the workers, as far as they come to an end in time."""
+        close_all((self._openings, self.worker, self.view_worker, self.detail_worker))
 
     # ------------------------------------------------------------------ what there is
 

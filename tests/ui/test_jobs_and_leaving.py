@@ -142,7 +142,7 @@ def test_saved_edits_open_again(driver, qtbot, tmp_path):
     driver.wait_idle()
 
 
-@pytest.mark.parametrize("moment", ["opening", "preparing", "settling"])
+@pytest.mark.parametrize("moment", ["compiling", "opening", "preparing", "settling"])
 def test_closing_while_a_job_runs_exits_with_0(tmp_path, moment):
     program = textwrap.dedent(
         f"""
@@ -151,7 +151,7 @@ def test_closing_while_a_job_runs_exits_with_0(tmp_path, moment):
         from PySide6.QtCore import QSettings, QTimer
         from PySide6.QtGui import QSurfaceFormat
         from PySide6.QtWidgets import QApplication
-        from splap_editor.app import make_window
+        from splap_editor.app import make_window, open_first
         from splap_editor.core.handle_nodes import Region
         from splap_editor.engine.edit import Pose
         from splap_editor.ui.viewport_widget import ask_of_qt
@@ -175,10 +175,43 @@ def test_closing_while_a_job_runs_exits_with_0(tmp_path, moment):
             session.scene_changed.connect(window.close)
         else:
             session.state_changed.connect(lambda: QTimer.singleShot(0, bend))
-        session.open(Path({str(TUBE)!r}))
+        if {moment!r} == "compiling":
+            first = open_first(window, Path({str(TUBE)!r}))
+            assert first is not None and not first.compilation.is_done
+            QTimer.singleShot(0, window.close)
+        else:
+            session.open(Path({str(TUBE)!r}))
         sys.exit(app.exec())
         """
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0, done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_a_thread_that_hears_nothing_and_never_falls_silent_ends_with_the_window(own_cache):
+    # Emitting a signal lets go of Python's lock: taking it again once Python is gone aborts the process.
+    program = textwrap.dedent(
+        f"""
+        import sys
+        from pathlib import Path
+        from PySide6.QtCore import QTimer
+        from PySide6.QtWidgets import QApplication
+        from splap_editor import app
+        from splap_editor.session import background_thread, jobs
+        background_thread.LEAVE_SECONDS = jobs.LEAVE_SECONDS = 0.1
+        def talk(job):
+            while True:
+                window.autosave._post(lambda: None)
+        def begin():
+            global window
+            window = next(w for w in QApplication.topLevelWidgets() if hasattr(w, "autosave"))
+            for worker in (window.session.view_worker, window.session.detail_worker):
+                worker.submit(jobs.Job("talk", "", talk))
+            QTimer.singleShot(50, window.close)
+        QTimer.singleShot(0, begin)
+        sys.exit(app.run(Path({str(TUBE)!r})))
+        """
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=120, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
