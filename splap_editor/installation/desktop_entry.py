@@ -4,15 +4,61 @@ import os
 import shutil
 import subprocess
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 
 from splap_editor.resources import resource
 
 APP_ID = "splap-editor"
 SESSION_TYPE = "application/x-splap"
-PLY_TYPE = "model/x-ply"
 
-# No default is set for PLY files: whoever shows them keeps them, and this program is among "Open with".
+
+@dataclass(frozen=True)
+class FileType:
+    """A kind of file as a desktop knows it.
+
+    Parameters
+    ----------
+    name : str
+    comment : str
+        What people call it; empty for a type that every desktop brings.
+    endings : tuple of str
+    weight : int
+        Of its endings, where 50 is what other programs' types have. A light one leaves them to whichever type the
+        system knows them by, if any.
+    more : str
+        Elements of its description.
+    """
+
+    name: str
+    comment: str
+    endings: tuple[str, ...]
+    weight: int = 10
+    more: str = ""
+
+    def described(self) -> str:
+        """Its element of a package of types."""
+        globs = "".join(f'<glob pattern="*{ending}" weight="{self.weight}"/>' for ending in self.endings)
+        return f'  <mime-type type="{self.name}"><comment>{self.comment}</comment>{self.more}{globs}</mime-type>\n'
+
+
+_SESSION_MORE = f'<sub-class-of type="application/json"/><icon name="{APP_ID}"/>'
+
+TYPES = (
+    FileType(SESSION_TYPE, "SpLap Editor session", (".splap",), 60, _SESSION_MORE),
+    FileType("model/x-ply", "PLY point cloud or splats", (".ply",)),
+    FileType("model/x-spz", "SPZ splats", (".spz",)),
+    FileType("model/x-sog", "SOG splats", (".sog",)),
+    FileType("model/x-splat", "Splats", (".splat",)),
+    FileType("model/x-ksplat", "KSPLAT splats", (".ksplat",)),
+    FileType("model/gltf-binary", "", (".glb",)),
+    FileType("model/gltf+json", "", (".gltf",)),
+    FileType("model/vnd.usd", "OpenUSD scene", (".usdc", ".usda", ".usd")),
+    FileType("model/vnd.usdz+zip", "OpenUSD package", (".usdz",)),
+)
+"""Of all files that the program opens by themselves. A SOG's ``meta.json`` is JSON like any other."""
+
+# No default is set for any but sessions: whoever shows a file keeps it, and this program is among "Open with".
 _ENTRY = """[Desktop Entry]
 Type=Application
 Version=1.0
@@ -23,27 +69,16 @@ Exec={command} %f
 Icon={app_id}
 Terminal=false
 Categories=Graphics;3DGraphics;
-Keywords=gaussian;splat;3dgs;2dgs;ply;deform;
-MimeType={session_type};{ply_type};
+Keywords=gaussian;splat;3dgs;2dgs;ply;spz;sog;deform;
+MimeType={types};
 StartupWMClass={app_id}
 StartupNotify=true
 InitialPreference=1
 """
 
-# A light weight leaves *.ply to whichever type the system knows it by, if any.
-_TYPES = """<?xml version="1.0" encoding="UTF-8"?>
+_PACKAGE = """<?xml version="1.0" encoding="UTF-8"?>
 <mime-info xmlns="http://www.freedesktop.org/standards/shared-mime-info">
-  <mime-type type="{session_type}">
-    <comment>SpLap Editor session</comment>
-    <sub-class-of type="application/json"/>
-    <icon name="{app_id}"/>
-    <glob pattern="*.splap" weight="60"/>
-  </mime-type>
-  <mime-type type="{ply_type}">
-    <comment>PLY point cloud or splats</comment>
-    <glob pattern="*.ply" weight="10"/>
-  </mime-type>
-</mime-info>
+{types}</mime-info>
 """
 
 
@@ -66,11 +101,10 @@ def integrate(data_home: Path | None = None) -> list[Path]:
         This is no Linux desktop.
     """
     home = _data_home(data_home)
-    names = {"app_id": APP_ID, "session_type": SESSION_TYPE, "ply_type": PLY_TYPE}
     texts = [
-        _ENTRY.format(command=_command(), **names),
+        _ENTRY.format(command=_command(), app_id=APP_ID, types=";".join(each.name for each in TYPES)),
         resource("icons", f"{APP_ID}.svg").read_text(encoding="utf-8"),
-        _TYPES.format(**names),
+        _PACKAGE.format(types="".join(each.described() for each in TYPES if each.comment)),
     ]
     files = _files(home)
     for path, text in zip(files, texts, strict=True):

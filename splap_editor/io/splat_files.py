@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 __all__ = [
     "FormatError",
     "SplatFile",
+    "are_splats",
+    "file_meant",
     "losses_by_format",
     "losses_of_saving",
     "read_splats",
@@ -40,7 +42,7 @@ def read_splats(
 ) -> SplatFile:
     """Read a splat file of any format in `FORMATS`.
 
-    What it is, its bytes say; the name counts for nothing. A PLY is read as
+    What it is, its bytes say; the name counts for nothing. A folder is read by its ``meta.json``. A PLY is read as
     `read_ply` does. Of another format the splats are decoded into a table with
     INRIA's columns, in the file's own order, and saved as a PLY that is the
     file that comes out.
@@ -59,7 +61,7 @@ def read_splats(
         If the file cannot be read or holds no usable splats (`PlyError`, `FormatError`); the message is one sentence
         for the user and what to do.
     """
-    path = Path(path)
+    path = file_meant(Path(path))
     source = Source(path, part_of(progress, 0.0, 0.2))
     try:
         row = format_of(path, source.head(GLANCE))
@@ -81,6 +83,22 @@ def read_splats(
     file = splat_file(evidence, found, format_name=row.name)
     progress(1.0)
     return replace(file, warnings=warnings + file.warnings)
+
+
+def file_meant(path: Path) -> Path:
+    """The file to read of a path: of a folder the one that names its others, if it holds one."""
+    held = path / "meta.json"
+    return held if held.is_file() else path
+
+
+def are_splats(path: Path) -> bool:
+    """Whether the first bytes of a file are those of splats, whatever its name."""
+    path = file_meant(path)
+    try:
+        start = Source(path).head(GLANCE)
+    except OSError:
+        return False
+    return any(row.is_begun_by(start) for row in FORMATS.values())
 
 
 def losses_of_saving(
@@ -112,8 +130,13 @@ def losses_by_format(file: SplatFile) -> dict[str, list[str]]:
 
 def name_filter(*, to_write: bool = False) -> str:
     """Endings of all formats for a file dialog: ``"*.ply *.spz …"``."""
-    rows = [row for row in FORMATS.values() if row.can_be_written or not to_write]
-    return " ".join(f"*{suffix}" for row in rows for suffix in row.suffixes)
+    rows = FORMATS.values()
+    suffixes = (
+        [row.suffixes if row.can_be_written else () for row in rows]
+        if to_write
+        else [row.opened_suffixes for row in rows]
+    )
+    return " ".join(f"*{suffix}" for held in suffixes for suffix in held)
 
 
 def write_splats(

@@ -4,7 +4,8 @@ from pathlib import Path
 
 from PySide6.QtGui import QDragEnterEvent, QDragLeaveEvent, QDropEvent
 
-from splap_editor.io.formats.table import format_named
+from splap_editor.io.formats.table import can_be_opened
+from splap_editor.io.splat_files import file_meant
 from splap_editor.ui.actions.file_actions import FileActions
 from splap_editor.ui.widgets.overlay import Overlay
 
@@ -21,6 +22,7 @@ class FileDrop:
         if path is not None:
             event.acceptProposedAction()
             what = {".json": "edit", ".splap": "session"}.get(path.suffix.lower(), "capture")
+            what = "capture" if can_be_opened(path) else what
             self.overlay.show_drop(f"Drop to open the {what} {path.name}")
 
     def dragLeaveEvent(self, event: QDragLeaveEvent) -> None:
@@ -37,7 +39,7 @@ class FileDrop:
 
 
 def _can_be_opened(path: Path) -> bool:
-    return path.suffix.lower() in (".splap", ".json", ".gltf") or format_named(path) is not None
+    return can_be_opened(path) or path.suffix.lower() in (".splap", ".json") or file_meant(path) != path
 
 
 def _dropped_path(event: QDropEvent) -> Path | None:

@@ -4,7 +4,9 @@ import contextlib
 import dataclasses
 import io
 import re
+import shutil
 import struct
+import zipfile
 import zlib
 from pathlib import Path
 
@@ -32,6 +34,9 @@ from tests.reference.ply import ply_bytes, splat_columns
 
 SHIFT = np.array([1.0, 2.0, -1.0])
 """Whole, for columns of whole numbers."""
+
+MOST_UNPACKED = 1 << 20
+"""Bytes of a file that an archive gives out; sound ones have a few thousand."""
 
 FOREIGN = re.compile(
     r"operands|broadcast|dtype|ndarray|axis \d|out of bounds|could not convert|invalid literal|to integer"
@@ -103,6 +108,21 @@ def check_splats(path: Path, number: int) -> bool:
     _check_written(path, file, number)
     scene_info(file)
     return True
+
+
+def check_folder(path: Path, number: int) -> bool:
+    """Whether the files of a zip, put into a folder as far as it gives them out, are accepted as a splat file."""
+    folder = path.with_name("folder")
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+    meta = folder / "meta.json"
+    meta.write_bytes(path.read_bytes())
+    # What a damaged archive raises is not tried here.
+    with contextlib.suppress(Exception), zipfile.ZipFile(path) as archive:
+        for info in archive.infolist():
+            if info.file_size < MOST_UNPACKED and re.fullmatch(r"[\w.]+", info.filename):
+                (folder / info.filename).write_bytes(archive.read(info))
+    return check_splats(meta, number)
 
 
 def _check_written(path: Path, file: SplatFile, number: int) -> None:

@@ -50,6 +50,8 @@ for row in FORMATS.values():
         KINDS[row.name] = Kind(
             row.suffixes[0], seeds.splat_file(row), TEXT, checks.check_ply, 3 if row.is_lossless else 1, True
         )
+    elif row.name == "sog-folder":
+        KINDS[row.name] = Kind(".zip", seeds.splat_file(FORMATS["sog"]), PACKED, checks.check_folder)
     else:
         KINDS[row.name] = Kind(row.suffixes[0], seeds.splat_file(row), PACKED, checks.check_splats, is_shown=True)
 

@@ -2,6 +2,7 @@ import configparser
 import os
 import re
 import shlex
+import shutil
 import sys
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
@@ -10,7 +11,8 @@ import pytest
 
 from splap_editor.cli import main
 from splap_editor.installation import desktop_entry
-from splap_editor.installation.desktop_entry import PLY_TYPE, SESSION_TYPE, integrate, remove
+from splap_editor.installation.desktop_entry import SESSION_TYPE, TYPES, integrate, remove
+from splap_editor.io.formats.table import FORMATS
 from splap_editor.io.session_file import SUFFIX
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="desktop entries are Linux's")
@@ -27,7 +29,7 @@ def test_integrate_writes_what_a_desktop_reads_and_remove_takes_all_of_it_away(t
     entry.optionxform = str
     entry.read(tmp_path / "applications" / "splap-editor.desktop")
     fields = entry["Desktop Entry"]
-    assert fields["MimeType"].split(";") == [SESSION_TYPE, PLY_TYPE, ""]
+    assert fields["MimeType"].split(";") == [*(each.name for each in TYPES), ""]
     program, *_, last = shlex.split(fields["Exec"])
     assert os.access(program, os.X_OK) and last == "%f"
     assert list(tmp_path.rglob(f"icons/**/{fields['Icon']}.svg"))
@@ -40,15 +42,35 @@ def test_integrate_writes_what_a_desktop_reads_and_remove_takes_all_of_it_away(t
     assert main(["integrate", "--remove"]) == 0 and "nothing to remove" in capsys.readouterr().out
 
 
-def test_the_session_type_is_ours_and_ply_files_keep_theirs(tmp_path):
+def test_the_session_type_is_ours_and_all_other_files_keep_theirs(tmp_path):
     types = ElementTree.parse(next(path for path in integrate(tmp_path) if path.suffix == ".xml")).getroot()
-    globs = {kind.get("type"): kind.find(f"{MIME}glob") for kind in types.iter(f"{MIME}mime-type")}
-    assert globs[SESSION_TYPE].get("pattern") == f"*{SUFFIX}"
+    globs = {kind.get("type"): kind.findall(f"{MIME}glob") for kind in types.iter(f"{MIME}mime-type")}
+    session = globs.pop(SESSION_TYPE)
+    assert [(each.get("pattern"), each.get("weight")) for each in session] == [(f"*{SUFFIX}", "60")]
     # 50 is what every other type has: that of another program wins.
-    assert int(globs[PLY_TYPE].get("weight")) < 50 < int(globs[SESSION_TYPE].get("weight"))
+    assert all(int(each.get("weight")) < 50 for held in globs.values() for each in held)
     # Nothing says that this program is anybody's default.
     assert not list(tmp_path.rglob("mimeapps.list"))
     remove(tmp_path)
+
+
+def test_every_file_that_opens_by_itself_is_of_a_type_of_the_entry():
+    opened = {suffix for row in FORMATS.values() for suffix in row.opened_suffixes} - {"meta.json"} | {SUFFIX}
+    endings = [ending for each in TYPES for ending in each.endings]
+    assert all(any(suffix.endswith(ending) for ending in endings) for suffix in opened)
+    assert len({each.name for each in TYPES}) == len(TYPES) and len(set(endings)) == len(endings)
+    assert set(endings) <= opened
+
+
+@pytest.mark.skipif(shutil.which("update-mime-database") is None, reason="shared-mime-info is not installed")
+def test_a_desktop_takes_the_types_and_forgets_them(tmp_path):
+    integrate(tmp_path)
+    globs = (tmp_path / "mime" / "globs2").read_text()
+    for each in TYPES:
+        assert all(f"{each.weight}:{each.name}:*{ending}\n" in globs for ending in each.endings if each.comment)
+    remove(tmp_path)
+    left = tmp_path / "mime" / "globs2"
+    assert not left.exists() or not any(each.name in left.read_text() for each in TYPES if each.comment)
 
 
 def test_a_path_with_marks_of_the_format_comes_through(monkeypatch):

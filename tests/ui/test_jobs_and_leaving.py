@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import textwrap
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ from PySide6.QtWidgets import QApplication, QMessageBox, QPushButton
 
 from splap_editor.core.handle_nodes import Region
 from splap_editor.engine.edit import Pose
+from splap_editor.io.splat_files import read_splats, write_splats
 from splap_editor.resources import resource
 
 from .conftest import WAIT_MS, Driver
@@ -50,6 +52,18 @@ def test_a_dropped_file_opens(driver, qtbot):
     qtbot.waitUntil(lambda: driver.scene is not before, timeout=WAIT_MS)
     assert driver.window.windowTitle().startswith("coil.ply")
     assert driver.session.history.can_undo is False
+
+
+@pytest.mark.parametrize("name", ["", "meta.json"])
+def test_a_dropped_folder_of_splats_opens_and_so_does_the_file_that_names_the_others(driver, qtbot, tmp_path, name):
+    file = read_splats(resource("samples", "coil.ply"))
+    write_splats(tmp_path / "coil.sog", file, file.splats)
+    with zipfile.ZipFile(tmp_path / "coil.sog") as held:
+        held.extractall(tmp_path / "coil")
+    before = driver.scene
+    drop(driver.window, tmp_path / "coil" / name)
+    qtbot.waitUntil(lambda: driver.scene is not before, timeout=WAIT_MS)
+    assert driver.scene.splats.n_splats == file.splats.n_splats and driver.scene.file.format_name == "sog-folder"
 
 
 def test_a_broken_file_is_refused_in_a_sentence_and_the_scene_stays(driver, qtbot, tmp_path):

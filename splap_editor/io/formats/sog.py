@@ -1,9 +1,13 @@
-"""PlayCanvas' SOG: lossless WebP pictures in a zip, each pixel a splat, numbers through tables of 256 values."""
+"""PlayCanvas' SOG: lossless WebP pictures, each pixel a splat, numbers through tables of 256 values.
+
+The pictures stand beside a ``meta.json``, in a zip or in a folder.
+"""
 
 import io
 import json
 import math
 import zipfile
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from typing import Any, BinaryIO, TypeVar
 
@@ -23,6 +27,7 @@ Result = TypeVar("Result")
 
 _WIDTHS = {3: 192, 8: 512, 15: 960}
 """Pixels across a palette, 64 entries side by side, by the coefficients of an entry."""
+_PARTS, _MARKS = (b'"means"', b'"scales"', b'"quats"', b'"sh0"', b'"shN"'), (b'.webp"', b'"codebook"', b'"mins"')
 _BLOCK_ROWS = 1 << 15
 _LARGEST_META = 1 << 22
 _LARGEST_PICTURE = 1 << 30
@@ -38,7 +43,29 @@ def read(source: Source, progress: Progress) -> tuple[PlyTable, list[str]]:
     FormatError
         If it is damaged, or of a newer version.
     """
-    archive = _Archive(source)
+    return _read(_Bundle(source), progress)
+
+
+def read_folder(source: Source, progress: Progress) -> tuple[PlyTable, list[str]]:
+    """Decode a SOG whose pictures are files beside its ``meta.json``; errors as of `read`."""
+    told = 0.0
+
+    def rising(share: float) -> None:
+        nonlocal told
+        told = max(told, share)
+        progress(told)
+
+    return _read(_Folder(source, lambda share: rising(0.0)), rising)
+
+
+def is_meta(start: bytes) -> bool:
+    """Whether a file begins as the ``meta.json`` of a SOG does."""
+    is_text = start.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"{"
+    return is_text and any(part in start for part in _PARTS) and any(mark in start for mark in _MARKS)
+
+
+def _read(archive: "_Archive", progress: Progress) -> tuple[PlyTable, list[str]]:
+    source = archive.source
     meta = archive.meta()
     version = meta.get("version", 1)
     if version not in (1, 2):
@@ -86,31 +113,24 @@ def _blocks(count: int, progress: Progress) -> Iterator[slice]:
         yield slice(lo, min(lo + _BLOCK_ROWS, count))
 
 
-class _Archive:
+class _Archive(ABC):
     """The pictures of a SOG."""
 
     def __init__(self, source: Source) -> None:
         self.source = source
-        self._zip = self._guarded(lambda: zipfile.ZipFile(io.BytesIO(source.data)))
-        self._members = {info.filename: info for info in self._zip.infolist()}
 
     def _guarded(self, call: Callable[[], Result]) -> Result:
         try:
             return call()
-        except (FormatError, Cancelled):
+        except (FormatError, Cancelled, MemoryError):
             raise
         # zipfile, zlib and pillow raise a dozen kinds, and each version its own.
         except Exception as error:
             raise self.source.damaged(f"its bytes do not unpack ({type(error).__name__})") from error
 
+    @abstractmethod
     def member(self, name: str, most_bytes: int) -> bytes:
         """Bytes of a member of at most that size."""
-        info = self._members.get(name)
-        if info is None:
-            raise self.source.damaged(f"it holds no {name[:80]!r}")
-        if info.file_size > most_bytes:
-            raise self.source.damaged(f"{name[:80]!r} is larger than {most_bytes:,} bytes")
-        return self._guarded(lambda: self._zip.read(info))
 
     def meta(self) -> dict[str, Any]:
         """What ``meta.json`` says."""
@@ -150,6 +170,37 @@ class _Archive:
             if data[12:16] == b"VP8X":
                 return int.from_bytes(data[24:27], "little") + 1, int.from_bytes(data[27:30], "little") + 1
         raise self.source.damaged(f"{name[:80]!r} is no lossless WebP")
+
+
+class _Bundle(_Archive):
+    """All in a zip."""
+
+    def __init__(self, source: Source) -> None:
+        super().__init__(source)
+        self._zip = self._guarded(lambda: zipfile.ZipFile(io.BytesIO(source.data)))
+        self._members = {info.filename: info for info in self._zip.infolist()}
+
+    def member(self, name: str, most_bytes: int) -> bytes:
+        """Bytes of a member of at most that size."""
+        info = self._members.get(name)
+        if info is None:
+            raise self.source.damaged(f"it holds no {name[:80]!r}")
+        if info.file_size > most_bytes:
+            raise self.source.damaged(f"{name[:80]!r} is larger than {most_bytes:,} bytes")
+        return self._guarded(lambda: self._zip.read(info))
+
+
+class _Folder(_Archive):
+    """Files beside each other; ``progress`` is asked while they are read."""
+
+    def __init__(self, source: Source, progress: Progress) -> None:
+        super().__init__(source)
+        self._progress = progress
+
+    def member(self, name: str, most_bytes: int) -> bytes:
+        """Bytes of a file of at most that size."""
+        # Of any name, the words are those of the file that was opened.
+        return self.source.beside(self.source.name if name == "meta.json" else name, most_bytes, self._progress)
 
 
 def _files(archive: _Archive, meta: dict[str, Any], part: str, n: int) -> list[str]:

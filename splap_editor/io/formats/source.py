@@ -64,6 +64,29 @@ class Source:
         except OSError as error:
             raise FormatError(f"{self.path} could not be read: {error.strerror or error}.") from error
 
+    def beside(self, name: str, most_bytes: int, progress: Progress = no_progress) -> bytes:
+        """All bytes of a file in the same folder, which this one names.
+
+        Raises
+        ------
+        FormatError
+            If the name or a link leads elsewhere, or what is there cannot be read or has more bytes.
+        """
+        advice = "Export it again as one file."
+        if name in ("", "..") or Path(name).name != name or any(mark in name for mark in "\\\0:"):
+            raise self.refused(f"keeps its numbers in {name[:80]!r}, which is not beside it", advice)
+        path = os.path.realpath(self.path.with_name(name))
+        if os.path.dirname(path) != os.path.realpath(self.path.parent):
+            raise self.refused(f"keeps its numbers in {name[:80]!r}, a link that leads out of its folder", advice)
+        try:
+            self.require_room(os.stat(path).st_size)
+            return regular_bytes(path, most_bytes, progress)
+        except OSError as error:
+            raise self.refused(
+                f"keeps its numbers in {name[:80]!r}, which cannot be read ({error.strerror or error})",
+                "Put that file beside it.",
+            ) from error
+
     def unpack(self, form: str, at: int) -> tuple[Any, ...]:
         """Numbers at a place, as `struct.unpack_from`.
 

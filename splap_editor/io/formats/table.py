@@ -28,6 +28,8 @@ class SplatFormat:
         What people call it.
     suffixes : tuple of str
         Endings of its files' names, the usual one first.
+    also_read : tuple of str
+        Endings of files that are read as well, and not written.
     is_begun_by : callable (bytes) → bool
         Whether a file's first `GLANCE` bytes give it away.
     reads, writes : str
@@ -61,6 +63,12 @@ class SplatFormat:
     log_scales: tuple[float, float] = (THIN_LOG_SCALE, float("inf"))
     colors: tuple[float, float] = (-float("inf"), float("inf"))
     readers: str = ""
+    also_read: tuple[str, ...] = ()
+
+    @property
+    def opened_suffixes(self) -> tuple[str, ...]:
+        """Endings of all its files that are opened."""
+        return self.suffixes + self.also_read
 
     @property
     def is_ply(self) -> bool:
@@ -118,6 +126,12 @@ def _function(path: str) -> Callable:
 
 def _is_sog(start: bytes) -> bool:
     return start[:4] == b"PK\x03\x04"
+
+
+def _is_sog_meta(start: bytes) -> bool:
+    from splap_editor.io.formats.sog import is_meta
+
+    return is_meta(start)
 
 
 def _is_usd(start: bytes) -> bool:
@@ -194,6 +208,7 @@ FORMATS: dict[str, SplatFormat] = {
             writes="usd:write_usdc",
             writes_frames="usd:write_usdc_frames",
             readers="programs on OpenUSD 26.03 and later",
+            also_read=(".usda", ".usd"),
         ),
         SplatFormat(
             "usdz",
@@ -217,6 +232,15 @@ FORMATS: dict[str, SplatFormat] = {
             reorders=True,
             readers="SuperSplat, PlayCanvas, splat-transform, Spark",
         ),
+        # Before glTF: both are JSON that names an asset.
+        SplatFormat(
+            "sog-folder",
+            "PlayCanvas' SOG in a folder",
+            ("meta.json",),
+            _is_sog_meta,
+            reads="sog:read_folder",
+            reorders=True,
+        ),
         SplatFormat(
             "gltf",
             "glTF with KHR_gaussian_splatting",
@@ -225,6 +249,7 @@ FORMATS: dict[str, SplatFormat] = {
             reads="gltf:read",
             writes="gltf:write",
             readers="PlayCanvas, Babylon.js, Cesium",
+            also_read=(".gltf",),
         ),
         SplatFormat("ksplat", "KSPLAT", (".ksplat",), _is_ksplat, reads="ksplat:read", reorders=True),
         # Last: without a header, it is whatever could be one.
@@ -258,14 +283,27 @@ def format_to_write(path: Path) -> SplatFormat:
     FormatError
         If files of that format can only be read.
     """
-    row = format_named(path)
+    row = format_named(path) or _only_opened(path)
     if row is None:
         return FORMATS["ply"]
+    if path.name.lower().endswith(row.also_read):
+        raise FormatError(
+            f"{path.name} cannot be written: {row.title} is saved as {row.suffixes[0]}. Choose a name that ends so."
+        )
     if not row.can_be_written:
         raise FormatError(
             f"{path.name} cannot be written: {row.title} is only read. Choose a name with one of {endings_to_write()}."
         )
     return row
+
+
+def _only_opened(path: Path) -> SplatFormat | None:
+    return next((row for row in FORMATS.values() if path.name.lower().endswith(row.also_read)), None)
+
+
+def can_be_opened(path: Path) -> bool:
+    """Whether a file's name ends in a format that is read."""
+    return any(path.name.lower().endswith(row.opened_suffixes) for row in FORMATS.values())
 
 
 def endings_to_write() -> str:

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QFileDialog, QMessageBox, QWidget
 
 from splap_editor.engine.export_report import ExportReport
 from splap_editor.io.session_file import SUFFIX
-from splap_editor.io.splat_files import name_filter
+from splap_editor.io.splat_files import are_splats, name_filter
 from splap_editor.resources import resource
 from splap_editor.session.bound_edit import column_lacks
 from splap_editor.session.documents import Documents
@@ -23,7 +23,7 @@ from splap_editor.ui.widgets.plain_text import PlainMessageBox
 from splap_editor.ui.widgets.toast import Toast
 from splap_editor.viewport.viewport import Viewport
 
-OPEN_FILTER = f"Splats or session ({name_filter()} *.gltf *.splap);;All files (*)"
+OPEN_FILTER = f"Splats or session ({name_filter()} *.splap);;All files (*)"
 EDIT_FILTER = "Edit (*.json);;All files (*)"
 SAMPLE = "windmill_2dgs.ply"
 
@@ -77,7 +77,7 @@ class FileActions:
 
     def open_path(self, path: Path) -> None:
         """Open a PLY, a session or an edit, after asking about an edit that would be lost."""
-        if path.suffix.lower() == ".json":
+        if path.suffix.lower() == ".json" and not are_splats(path):
             self._read_edit(path)
         elif path.suffix.lower() == SUFFIX:
             self.leave_edit(lambda: self._documents.open(path))

@@ -3,13 +3,16 @@
 import dataclasses
 import gzip
 import json
+import os
 import struct
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from splap_editor.engine.recipe_edit import edit_of, require_rows_fit, rows_of
+from splap_editor.io.formats import sog
 from splap_editor.io.formats.source import FormatError
 from splap_editor.io.plain_edit import Edit, Handle, Pin
 from splap_editor.io.ply import PlyError
@@ -52,6 +55,7 @@ def test_a_damaged_spz_is_refused(tmp_path, data, words):
         read_splats(tmp_path / "bad.spz")
 
 
+@pytest.mark.parametrize("is_bundled", [True, False])
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -62,22 +66,116 @@ def test_a_damaged_spz_is_refused(tmp_path, data, words):
         (lambda meta: meta["means"].update(mins=[0, None, 0]), "3 numbers as mins"),
         (lambda meta: meta["scales"].update(codebook=[]), "table of up to 256 values"),
         (lambda meta: meta["scales"].update(codebook=[float("nan")] * 256), "256 numbers"),
-        (lambda meta: meta["quats"].update(files=["nothing.webp"]), "holds no 'nothing.webp'"),
+        (lambda meta: meta["quats"].update(files=["nothing.webp"]), "'nothing.webp'"),
         (lambda meta: meta["quats"].update(files=["meta.json"]), "no lossless WebP"),
     ],
 )
-def test_a_sog_whose_words_do_not_fit_its_pictures_is_refused(tmp_path, scene, change, words):
-    write_splats(tmp_path / "good.sog", scene, scene.splats)
-    with zipfile.ZipFile(tmp_path / "good.sog") as good, zipfile.ZipFile(tmp_path / "bad.sog", "w") as bad:
-        for name in good.namelist():
-            data = good.read(name)
-            if name == "meta.json":
-                meta = json.loads(data)
-                change(meta)
-                data = json.dumps(meta).encode()
-            bad.writestr(name, data)
+def test_a_sog_whose_words_do_not_fit_its_pictures_is_refused(tmp_path, scene, change, words, is_bundled):
+    folder = unbundled(tmp_path, scene)
+    change_meta(folder, change)
+    path = bundled(folder, tmp_path / "bad.sog") if is_bundled else folder
     with pytest.raises(FormatError, match=words):
-        read_splats(tmp_path / "bad.sog")
+        read_splats(path)
+
+
+def unbundled(tmp_path: Path, scene) -> Path:
+    """A folder of a SOG's files."""
+    write_splats(tmp_path / "good.sog", scene, scene.splats)
+    with zipfile.ZipFile(tmp_path / "good.sog") as held:
+        held.extractall(tmp_path / "folder")
+    return tmp_path / "folder"
+
+
+def bundled(folder: Path, path: Path) -> Path:
+    """A zip of a folder's files."""
+    with zipfile.ZipFile(path, "w") as archive:
+        for file in folder.iterdir():
+            archive.write(file, file.name)
+    return path
+
+
+def change_meta(folder: Path, change) -> None:
+    meta = json.loads((folder / "meta.json").read_text())
+    change(meta)
+    (folder / "meta.json").write_text(json.dumps(meta))
+
+
+@pytest.mark.parametrize("name", ["../means_l.webp", "/etc/passwd", "a/../../x", "..", "", "c:x.webp", "a\\b", "a\0b"])
+def test_a_sog_in_a_folder_reads_nothing_elsewhere(tmp_path, scene, name):
+    folder = unbundled(tmp_path, scene)
+    (tmp_path / "means_l.webp").write_bytes((folder / "means_l.webp").read_bytes())
+    change_meta(folder, lambda meta: meta["means"].update(files=[name, "means_u.webp"]))
+    with pytest.raises(FormatError, match="not beside it"):
+        read_splats(folder)
+
+
+def test_a_sog_in_a_folder_follows_no_link_out_of_it(tmp_path, scene):
+    folder = unbundled(tmp_path, scene)
+    outside = (folder / "quats.webp").rename(tmp_path / "quats.webp")
+    (folder / "quats.webp").symlink_to(outside)
+    with pytest.raises(FormatError, match=r"'quats\.webp', a link that leads out of its folder"):
+        read_splats(folder)
+    (folder / "quats.webp").unlink()
+    (folder / "quats.webp").symlink_to("quats.webp")
+    with pytest.raises(FormatError, match=r"'quats\.webp', which cannot be read"):
+        read_splats(folder)
+    (folder / "quats.webp").unlink()
+    outside.rename(folder / "elsewhere.webp")
+    (folder / "quats.webp").symlink_to("elsewhere.webp")
+    assert read_splats(folder).splats.n_splats == scene.splats.n_splats
+
+
+def test_a_sog_in_a_folder_that_is_too_large_or_no_file_is_not_read(tmp_path, scene, monkeypatch):
+    folder = unbundled(tmp_path, scene)
+    with monkeypatch.context() as limits:
+        limits.setattr(sog, "_LARGEST_PICTURE", 100)
+        with pytest.raises(FormatError, match="at most 100 are read"):
+            read_splats(folder)
+    with (folder / "scales.webp").open("r+b") as file:
+        file.truncate(1 << 40)
+    with pytest.raises(FormatError, match="GiB of memory"):
+        read_splats(folder)
+    (folder / "scales.webp").unlink()
+    os.mkfifo(folder / "scales.webp")
+    with pytest.raises(FormatError, match="a pipe"):
+        read_splats(folder)
+    (folder / "meta.json").write_text((folder / "meta.json").read_text() + " " * (1 << 23))
+    with pytest.raises(FormatError, match="at most 4,194,304 are read"):
+        read_splats(folder)
+
+
+def test_a_gltf_follows_no_link_out_of_its_folder(tmp_path, scene):
+    write_splats(tmp_path / "out.glb", scene, scene.splats)
+    packed = (tmp_path / "out.glb").read_bytes()
+    length = int.from_bytes(packed[12:16], "little")
+    held = json.loads(packed[20 : 20 + length])
+    held["buffers"][0]["uri"] = "numbers.bin"
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    (folder / "scene.gltf").write_text(json.dumps(held))
+    (tmp_path / "numbers.bin").write_bytes(packed[28 + length :])
+    (folder / "numbers.bin").symlink_to(tmp_path / "numbers.bin")
+    with pytest.raises(FormatError, match="leads out of its folder"):
+        read_splats(folder / "scene.gltf")
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda held: held["accessors"][0].update(componentType=[5126]), "componentType is"),
+        (lambda held: held["accessors"][0].update(componentType=5124), "wrong type"),
+        (lambda held: held.update(scenes=None, nodes=5), "holds no Gaussian splats"),
+    ],
+)
+def test_a_gltf_whose_json_is_of_other_types_is_refused(tmp_path, scene, change, words):
+    write_splats(tmp_path / "out.glb", scene, scene.splats)
+    packed = (tmp_path / "out.glb").read_bytes()
+    length = int.from_bytes(packed[12:16], "little")
+    held = json.loads(packed[20 : 20 + length])
+    change(held)
+    (tmp_path / "bad.gltf").write_text(json.dumps(held))
+    with pytest.raises(FormatError, match=words):
+        read_splats(tmp_path / "bad.gltf")
 
 
 def test_a_splat_file_cut_short_is_refused(tmp_path):

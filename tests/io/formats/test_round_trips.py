@@ -2,7 +2,9 @@
 
 import dataclasses
 import gzip
+import json
 import struct
+import zipfile
 from pathlib import Path
 
 import gaussforge
@@ -17,7 +19,7 @@ from splap_editor.io.formats.spz import _FLIPS
 from splap_editor.io.formats.table import FORMATS, format_to_write
 from splap_editor.io.ply import read_ply, write_ply
 from splap_editor.io.sample_maker import write_sample
-from splap_editor.io.splat_files import losses_by_format, losses_of_saving, read_splats, write_splats
+from splap_editor.io.splat_files import are_splats, losses_by_format, losses_of_saving, read_splats, write_splats
 
 PARTS = ("means", "log_scales", "quats", "logit_opacities", "sh0", "shN")
 
@@ -278,3 +280,34 @@ def test_splats_made_bare_are_finite_and_look_as_they_did():
     filtered = dataclasses.replace(splats, filter_radii=np.full(30, 0.01, np.float32))
     np.testing.assert_allclose(np.exp(bare.log_scales[7:]), filtered.scales[7:], rtol=1e-5)
     np.testing.assert_allclose(alphas_of(bare.logit_opacities[7:]), filtered.opacities[7:], rtol=1e-4, atol=1e-6)
+
+
+def test_a_sog_in_a_folder_is_the_same_as_in_one_file(tmp_path):
+    file = as_file(tmp_path, scene())
+    write_splats(tmp_path / "scene.sog", file, file.splats)
+    with zipfile.ZipFile(tmp_path / "scene.sog") as held:
+        held.extractall(tmp_path / "folder")
+    whole = read_splats(tmp_path / "scene.sog").splats
+    # By content, so that the name is its own.
+    renamed = (tmp_path / "folder" / "meta.json").rename(tmp_path / "folder" / "scene.words")
+    shares: list[float] = []
+    named = read_splats(renamed, progress=shares.append)
+    assert shares == sorted(shares) and shares[-1] == 1.0
+    renamed.rename(tmp_path / "folder" / "meta.json")
+    for found in (named, read_splats(tmp_path / "folder"), read_splats(tmp_path / "folder" / "meta.json")):
+        assert found.format_name == "sog-folder"
+        for part in PARTS:
+            np.testing.assert_array_equal(getattr(found.splats, part), getattr(whole, part))
+
+
+def test_edits_and_sessions_are_not_taken_for_splats(tmp_path):
+    file = as_file(tmp_path, scene())
+    write_splats(tmp_path / "scene.sog", file, file.splats)
+    with zipfile.ZipFile(tmp_path / "scene.sog") as held:
+        held.extractall(tmp_path / "folder")
+    words = {"version": 1, "handles": [{"name": "means", "center": [0, 0, 0], "radius": 0.1}]}
+    (tmp_path / "edit.json").write_text(json.dumps(words))
+    (tmp_path / "long.json").write_text(json.dumps({**words, "pins": [{"rows": list(range(9000))}]}))
+    assert not are_splats(tmp_path / "edit.json") and not are_splats(tmp_path / "long.json")
+    assert not are_splats(tmp_path / "nowhere.json") and not are_splats(tmp_path)
+    assert are_splats(tmp_path / "folder") and are_splats(tmp_path / "folder" / "meta.json")
