@@ -31,7 +31,8 @@ def codebook(values: NDArray[np.floating]) -> tuple[NDArray[np.float32], NDArray
     low, high = float(values.min()), float(values.max())
     if high <= low:
         return np.full(256, low, np.float32), np.zeros(values.shape, np.uint8)
-    counts, edges = np.histogram(values, _BINS, (low, high))
+    # In double precision, as neighbouring single numbers leave no room for bins between them.
+    counts, edges = np.histogram(values.astype(np.float64), _BINS, (low, high))
     middles = (edges[:-1] + edges[1:]) / 2
     # The square root of the density lies between equal steps and equal counts.
     share = np.cumsum(np.sqrt(counts))
@@ -44,7 +45,8 @@ def codebook(values: NDArray[np.floating]) -> tuple[NDArray[np.float32], NDArray
     # The ends are met: a splat must not shrink or pale for being the extreme.
     numbers[0], numbers[-1] = low, high
     numbers = np.sort(numbers).astype(np.float32)
-    return numbers, np.searchsorted((numbers[1:] + numbers[:-1]) / 2, values).astype(np.uint8)
+    exact = numbers.astype(np.float64)
+    return numbers, np.searchsorted((exact[1:] + exact[:-1]) / 2, values).astype(np.uint8)
 
 
 def palette(vectors: NDArray[np.float32], progress: Progress) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
