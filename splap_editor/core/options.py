@@ -92,7 +92,7 @@ class Option:
     is_percent : bool
         A form shows a hundred times the value.
     step, decimals
-        Of the number in a form.
+        Of the value, which a form may show as percent: 0.01 and 2 are steps of 1 % without decimals.
     only_for : (str, tuple), optional
         Name and values of another option of the group without which this one means nothing.
     is_always_written : bool

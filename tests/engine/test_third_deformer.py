@@ -9,7 +9,7 @@ import pytest
 from splap_editor.core import deformers
 from splap_editor.core.deformer import Deformation
 from splap_editor.core.deformers import DeformerRow
-from splap_editor.core.options import check_options, option
+from splap_editor.core.options import Length, ShareOfSize, check_options, option, world_length
 from splap_editor.core.progress import no_progress
 from splap_editor.engine.bound_edit import posed
 from splap_editor.engine.edit import binds_like
@@ -28,6 +28,7 @@ class FadeOptions:
     """How a handle's motion fades."""
 
     power: float = option(2.0, "How fast the motion fades with distance.", label="Power", above=0.0, most=8.0)
+    reach: Length = option(ShareOfSize(9.0), "What is farther stays.", label="Reach", above=0.0, unit="world")
 
     def __post_init__(self) -> None:
         check_options(self)
@@ -38,8 +39,10 @@ class FadeDeformer:
 
     def __init__(self, surface, handles, options):
         self.rest = surface.rest
-        apart = np.linalg.norm(self.rest - handles.centers[0], axis=1) / surface.scene_scale
-        self.parts = 1.0 / (1.0 + apart) ** options.power
+        apart = np.linalg.norm(self.rest - handles.centers[0], axis=1)
+        reach = world_length(options.reach, surface.scene_scale)
+        self.parts = 1.0 / (1.0 + apart / surface.scene_scale) ** options.power
+        self.parts[apart > (np.inf if reach is None else reach)] = 0.0
 
     def drag(self, transforms):
         shift = transforms[0, :3, 3]
@@ -79,10 +82,11 @@ def test_recipes_spell_it_both_ways(fade):
     with pytest.raises(RecipeError, match=r"fade\.power must be a finite number greater than 0 and at most 8, got 9"):
         recipe_from_json({**RECIPE, "fade": {"power": 9}})
     assert recipe_schema()["properties"]["fade"]["properties"]["power"]["maximum"] == 8.0
+    assert recipe_from_json({**RECIPE, "fade": {"reach": None}}).options[FadeOptions].reach is None
 
 
 def test_unknown_ones_are_refused_with_those_there_are(fade):
-    with pytest.raises(RecipeError, match='method must be "arap" or "bbw" or "fade", got "fado"'):
+    with pytest.raises(RecipeError, match=r'method must be "arap" or "bbw".* or "fade", got "fado"'):
         recipe_from_json({**RECIPE, "method": "fado"})
 
 

@@ -99,6 +99,9 @@ def test_every_form_offers_just_what_its_options_may_be(driver):
             elif isinstance(editor, NumberField) and known.kind == "integer":
                 # A field has ends even where the option has none.
                 assert [editor.minimum(), editor.maximum()] == [known.least, min(known.most, 1e9)], name
+            elif isinstance(editor, NumberField) and known.kind == "length":
+                # Its least number stands for no bound.
+                assert known.accepts(None) and known.accepts(editor.maximum()), name
             elif isinstance(editor, NumberField):
                 factor = 100.0 if known.is_percent else 1.0
                 assert known.accepts(editor.minimum() / factor) and known.accepts(editor.maximum() / factor)

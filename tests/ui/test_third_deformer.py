@@ -9,6 +9,7 @@ from splap_editor.core.handle_nodes import Region
 from splap_editor.engine.edit import Pose
 from splap_editor.ui.panels.deformer_panel import DeformerPanel
 from splap_editor.ui.widgets.number_field import NumberField
+from splap_editor.ui.widgets.options_form import NO_BOUND
 from tests.engine.test_third_deformer import FadeOptions, bind_fade
 
 BIND = "splap_editor.core.deformer:bind_fade"
@@ -46,3 +47,24 @@ def test_choosing_it_and_changing_its_option_bends_the_scene(fade, driver):
     driver.session.history.undo()
     driver.wait_idle()
     np.testing.assert_allclose(scene.kernels.means[:, 2] - scene.splats.means[:, 2], whole, atol=1e-9)
+
+
+def test_its_length_is_shown_in_the_units_of_the_file_or_without_bound(fade, driver):
+    session, scene = driver.session, driver.scene
+    panel = driver.window.findChild(DeformerPanel)
+    center = np.array([1.1, 0.0, 0.3])
+    session.steps.add_handle(Region(center, radius=0.1), pose=Pose(translate=(0.0, 0.0, 0.2)))
+    panel.method.setCurrentIndex(panel.method.findData("fade"))
+    reach = panel.forms[FadeOptions].findChild(NumberField, "reach")
+    assert reach.isVisibleTo(panel) and reach.value() == pytest.approx(9.0 * scene.ellipses.scene_scale, abs=1e-4)
+    reach.setValue(0.5)
+    assert scene.edit.options[FadeOptions] == FadeOptions(reach=0.5) and session.history.undo_label == "Change reach"
+    driver.wait_idle()
+    moved = scene.kernels.means[:, 2] - scene.splats.means[:, 2] > 0.01
+    apart = np.linalg.norm(scene.splats.means - center, axis=1)
+    assert moved[apart < 0.4].all() and not moved[apart > 0.6].any()
+    reach.setValue(reach.minimum())
+    assert scene.edit.options[FadeOptions] == FadeOptions(reach=None) and reach.text() == NO_BOUND
+    session.history.undo()
+    assert reach.value() == 0.5
+    driver.wait_idle()

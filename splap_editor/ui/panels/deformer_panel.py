@@ -142,9 +142,10 @@ class DeformerPanel(QWidget):
         self.method.blockSignals(False)
         self.method.setToolTip(method_tips()[edit.method])
         row, free = edit.deformer, edit.options[ReachOptions].free_radius
+        size = self._scene.ellipses.scene_scale if self._scene is not None else 1.0
         for group, form in self.forms.items():
             form.setVisible(group is row.options)
-            form.show_value(edit.options[group])
+            form.show_value(edit.options[group], size)
         self.kernels.show_value(edit.options[AdaptationOptions])
         self.weights.setVisible(row.has_weights)
         self.whole.setVisible(row.has_free_radius)
@@ -152,7 +153,6 @@ class DeformerPanel(QWidget):
         for part in (self.free_radius, self._radius_label):
             part.setVisible(row.has_free_radius)
             part.setEnabled(free is not None)
-        size = self._scene.ellipses.scene_scale if self._scene is not None else 1.0
         radius = world_length(_REACH.default if free is None else free, size)
         self.free_radius.setSingleStep(0.05 * size)
         self.free_radius.show_value(radius)
@@ -160,9 +160,14 @@ class DeformerPanel(QWidget):
 
     def _form(self, group: type, edit: Edit) -> OptionsForm:
         form = OptionsForm(edit.options[group])
-        title = next(iter(options_of(group).values())).label
-        form.changed.connect(lambda options: self._take(options, title))
+        form.changed.connect(lambda options: self._take(options, self._changed_label(options)))
         return form
+
+    def _changed_label(self, group: Any) -> str:
+        """What the one option is called in which a group differs from that of the edit."""
+        before = self._scene.edit.options[type(group)] if self._scene is not None else group
+        changed = (each for name, each in options_of(group).items() if getattr(group, name) != getattr(before, name))
+        return next((each.label for each in changed), "")
 
     def _on_whole_clicked(self, whole: bool) -> None:
         self._take(ReachOptions(None if whole else _REACH.default), _REACH.label)

@@ -7,7 +7,7 @@ from typing import Any
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QCheckBox, QComboBox, QGridLayout, QLabel, QWidget
 
-from splap_editor.core.options import Option, options_of
+from splap_editor.core.options import Option, options_of, world_length
 from splap_editor.ui.theme import STEP
 from splap_editor.ui.widgets.choices import Choice
 from splap_editor.ui.widgets.number_field import NumberField
@@ -34,6 +34,8 @@ class FieldHint:
         A number is shown so many times its value, as 100 for percent.
     only_for : (str, tuple), optional
         Name and values of another field without which this one means nothing.
+    is_length : bool
+        A `Length`: shown in the file's units as it comes out in the scene, its lowest number for no bound.
     """
 
     label: str
@@ -46,15 +48,20 @@ class FieldHint:
     choices: Mapping[Any, str] | None = None
     factor: float = 1.0
     only_for: tuple[str, tuple] | None = None
+    is_length: bool = False
 
 
 _WIDEST = 1e9
 """Bound of a number that has none of its own."""
 
 
+NO_BOUND = "no bound"
+"""A length that is None, in a field."""
+
+
 def hints_of(group: Any) -> dict[str, FieldHint]:
     """Hints for the options of a group, or of its class, that a form can show."""
-    unshown = ("pairs", "length", "strokes")
+    unshown = ("pairs", "strokes")
     return {name: _hint(known) for name, known in options_of(group).items() if known.kind not in unshown}
 
 
@@ -74,6 +81,7 @@ def _hint(known: Option) -> FieldHint:
         {name: choice.label for name, choice in known.choices.items()},
         factor,
         known.only_for,
+        known.kind == "length",
     )
 
 
@@ -81,7 +89,7 @@ class OptionsForm(QWidget):
     """Edits a frozen dataclass; each finished entry gives a new value.
 
     Fields come in their order in the class; one without a hint is not shown. Hints are made of the options of the class
-    unless given.
+    unless given. A length needs the scene's size to be shown.
     """
 
     changed = Signal(object)
@@ -90,6 +98,7 @@ class OptionsForm(QWidget):
         super().__init__(parent)
         hints = hints_of(value) if hints is None else hints
         self._value = value
+        self._size = 1.0
         self._hints = {field.name: hints[field.name] for field in fields(value) if field.name in hints}
         self._editors: dict[str, QWidget] = {}
         self._labels: dict[str, QLabel] = {}
@@ -117,9 +126,10 @@ class OptionsForm(QWidget):
         """What it shows."""
         return self._value
 
-    def show_value(self, value: Any) -> None:
-        """Show a value without telling anyone."""
+    def show_value(self, value: Any, size: float | None = None) -> None:
+        """Show a value without telling anyone, in a scene of some size or the one shown before."""
         self._value = value
+        self._size = self._size if size is None else size
         for name, editor in self._editors.items():
             held = getattr(value, name)
             editor.blockSignals(True)
@@ -127,6 +137,10 @@ class OptionsForm(QWidget):
                 editor.setChecked(held)
             elif isinstance(editor, QComboBox):
                 editor.setCurrentIndex(max(editor.findData(held), 0))
+            elif isinstance(editor, NumberField) and self._hints[name].is_length:
+                length = world_length(held, self._size)
+                editor.setSingleStep(0.05 * self._size)
+                editor.show_value(editor.minimum() if length is None else length)
             elif isinstance(editor, NumberField):
                 editor.show_value(self._hints[name].factor * held)
             editor.blockSignals(False)
@@ -152,6 +166,11 @@ class OptionsForm(QWidget):
             switch = QCheckBox(hint.label)
             switch.toggled.connect(lambda checked: self._take(name, checked))
             return switch
+        if hint.is_length:
+            field = NumberField(0.0, hint.high, decimals=4)
+            field.setSpecialValueText(NO_BOUND)
+            field.committed.connect(lambda number: self._take(name, number if number > field.minimum() else None))
+            return field
         kind = type(value)
         decimals = 0 if kind is int else hint.decimals
         field = NumberField(hint.low, hint.high, decimals=decimals, step=hint.step, unit=hint.unit)

@@ -73,7 +73,8 @@ class HeldForm(QWidget):
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(STEP)
-        self._hints = hints_of(held.value)
+        # A length would need the scene's size; tools count in shares of it, or in pixels.
+        self._hints = {name: hint for name, hint in hints_of(held.value).items() if not hint.is_length}
         for name, hint in self._hints.items():
             self.editors[name] = self._editor(name, hint, row)
         held.changed.connect(self._show)
@@ -95,14 +96,16 @@ class HeldForm(QWidget):
             choice.activated.connect(lambda index: self._take(name, choice.itemData(index)))
             row.addWidget(choice)
             return choice
-        field = NumberField(hint.low, hint.high, decimals=hint.decimals, step=hint.step, unit=hint.unit)
+        is_whole = isinstance(getattr(self._held.value, name), int)
+        decimals = 0 if is_whole else hint.decimals
+        field = NumberField(hint.low, hint.high, decimals=decimals, step=hint.step, unit=hint.unit)
         field.setToolTip(hint.tip)
         # Six of them fit beside the buttons of a small window.
         field.setMinimumWidth(40)
         field.setMaximumWidth(64)
         grip = ScrubLabel(hint.label, field)
         for told in (field.committed, grip.moved):
-            told.connect(lambda number: self._take(name, number / hint.factor))
+            told.connect(lambda number: self._take(name, round(number) if is_whole else number / hint.factor))
         row.addWidget(grip)
         row.addWidget(field)
         return field

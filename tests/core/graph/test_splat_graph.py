@@ -208,7 +208,7 @@ def test_mended_edges_are_pairs_of_file_rows():
         ({"add": ((0, -1),)}, "add: rows -1 are not in the file"),
         ({"add": ((0, 7), (7, 2))}, "add: rows 7 are inert"),
         ({"cut": ((4, 4),)}, "cut: row 4 is paired with itself"),
-        ({"rule": "nearest"}, 'rule must be "touch" or "paper"'),
+        ({"rule": "no such rule"}, 'rule must be "touch" or "paper"'),
         ({"epsilon": -1.0}, "epsilon must be a finite number"),
         ({"k": 2}, "k must be a whole number, 3 to 1000"),
     ],
