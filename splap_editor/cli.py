@@ -22,6 +22,10 @@ if TYPE_CHECKING:
 
 EXIT_OK, EXIT_REFUSED = 0, 2
 
+_AS_3DGS = (
+    "write a PLY that programs which only know 3DGS read rightly: a thin third scale beside two, and of SpikingGS or a "
+    "3-D filter a plain file"
+)
 _PICTURES = "a .png, a folder, or of several pictures a .mp4, .webm, .gif or .apng"
 
 
@@ -78,7 +82,11 @@ def _parser() -> argparse.ArgumentParser:
     convert = commands.add_parser("convert", help="write a splat file in another format")
     _add_input(convert)
     convert.add_argument("-o", "--output", required=True, type=Path, metavar="OUT", help="its ending names the format")
-    convert.add_argument("--as-3dgs", action="store_true", help="add a thin third scale to a file of two")
+    convert.add_argument(
+        "--as-3dgs",
+        action="store_true",
+        help=_AS_3DGS,
+    )
     _add_output(convert)
     convert.set_defaults(run=_convert)
 
@@ -108,7 +116,11 @@ def _add_deform(deform: argparse.ArgumentParser) -> None:
     deform.add_argument(
         "-o", "--output", required=True, type=Path, metavar="OUT", help="a PLY, or what its ending names"
     )
-    deform.add_argument("--as-3dgs", action="store_true", help="add a thin third scale to a file of two")
+    deform.add_argument(
+        "--as-3dgs",
+        action="store_true",
+        help=_AS_3DGS,
+    )
     deform.add_argument("--columns", default="", metavar="NAMES", help="also write quantities: displacement,stretch")
     deform.add_argument("--no-cache", action="store_true", help="neither read nor keep graph and Laplacian")
     _add_output(deform)
@@ -247,7 +259,7 @@ def _read_to_write(
         file = read_splats(options.file, layout=options.layout, progress=report.progress)
     for warning in file.warnings:
         report.say(f"note: {warning}")
-    lost = losses_of_saving(file, row)
+    lost = losses_of_saving(file, row, as_3dgs=options.as_3dgs)
     for loss in lost:
         report.say(f"lost in {options.output.name}: {loss}")
     return file, lost

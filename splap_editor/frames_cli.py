@@ -67,7 +67,7 @@ def deform_frames(options: argparse.Namespace) -> int:
         raise ValueError("--frames needs keyframes: give a session saved by the editor with --session")
     frames = frame_range(options.frames, held.timeline.n_frames)
     file, poser = _prepared(options, held, report)
-    for loss in losses_of_saving(file, format_to_write(options.output)):
+    for loss in losses_of_saving(file, format_to_write(options.output), as_3dgs=options.as_3dgs):
         report.say(f"lost in {options.output.name}: {loss}")
     with report("frames"):
         as_3dgs, said = options.as_3dgs, report.say

@@ -1,11 +1,13 @@
 """Camera keys: where the camera stands at some frames, and the way in between."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.bbw.rigid_curves import rigid_curve, scale_curve
+from splap_editor.core.place import Place
 
 Vector = tuple[float, float, float]
 
@@ -68,6 +70,48 @@ class CameraKey:
 
     frame: int
     pose: CameraPose
+
+
+@dataclass(frozen=True, eq=False)
+class CameraTrack:
+    """A camera at frames one after another, as other programs hold one.
+
+    Parameters
+    ----------
+    matrices : (F, 4, 4) float
+        ``world_from_camera``, as of `CameraPose.matrix`.
+    angles : (F,) float
+        Fields of view from the lower to the upper edge, in degrees.
+    distances : (F,) float
+        From the eye to the target.
+    is_parallel : bool
+        Orthographic, as high as the perspective picture is at the target.
+    """
+
+    matrices: NDArray[np.float64]
+    angles: NDArray[np.float64]
+    distances: NDArray[np.float64]
+    is_parallel: bool
+
+    @property
+    def heights(self) -> NDArray[np.float64]:
+        """(F,) of the pictures at the target, in world units."""
+        return 2.0 * self.distances * np.tan(np.radians(self.angles) / 2.0)
+
+    @property
+    def clipping(self) -> tuple[float, float]:
+        """A near and a far distance that keep whatever is about the targets."""
+        return 1e-3 * float(self.distances.min()), 1e3 * float(self.distances.max())
+
+
+def camera_track(poses: Sequence[CameraPose], place: Place) -> CameraTrack:
+    """Cameras of a scene as they stand once the whole is in its place; whether they are parallel, the first says."""
+    matrices = np.array([pose.matrix for pose in poses])
+    matrices[:, :3, :3] = place.rotation @ matrices[:, :3, :3]
+    matrices[:, :3, 3] = matrices[:, :3, 3] @ place.matrix[:3, :3].T + place.matrix[:3, 3]
+    angles = np.array([pose.angle for pose in poses])
+    distances = np.array([pose.distance for pose in poses]) * place.scale
+    return CameraTrack(matrices, angles, distances, poses[0].is_parallel)
 
 
 def camera_between(keys: tuple[CameraKey, ...], frame: float, *, is_smooth: bool) -> CameraPose:

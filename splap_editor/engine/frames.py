@@ -18,7 +18,7 @@ from splap_editor.engine.cache import StageCache
 from splap_editor.engine.edit import Edit
 from splap_editor.engine.keyframes import edit_at_frame
 from splap_editor.engine.scripting import write_posed
-from splap_editor.engine.skin import write_skin
+from splap_editor.engine.skin import camera_of, write_skin
 from splap_editor.engine.surface import Surface
 from splap_editor.io.formats.table import format_named, format_to_write
 from splap_editor.io.png import write_png
@@ -158,7 +158,9 @@ def _write_animation(poser: FramePoser, file: SplatFile, frames: range, path: Pa
             yield frames[done], written_splats(file.splats, kernels, poser.edit)
             progress((done + 1) / len(frames))
 
-    write_animation(path, file, posed(), poser.edit.timeline.fps, removed=poser.edit.removed)
+    edit = poser.edit
+    camera = camera_of(edit, frames)
+    write_animation(path, file, posed(), edit.timeline.fps, removed=edit.removed, camera=camera)
 
 
 def _write_skin(poser: FramePoser, file: SplatFile, frames: range, path: Path, progress: Progress) -> float:

@@ -7,8 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from splap_editor.core.camera_path import CameraTrack, camera_track
 from splap_editor.core.progress import Progress, no_progress
 from splap_editor.engine.bound_edit import BoundEdit
+from splap_editor.engine.edit import Edit
 from splap_editor.engine.keyframes import edit_at_frame
 from splap_editor.io.formats.gltf_skin import Skin
 from splap_editor.io.splat_files import FormatError, SplatFile, write_skinned
@@ -86,4 +88,11 @@ def skin_of(file: SplatFile, bound: BoundEdit, frames: range) -> Skin:
         scales=np.array([[np.broadcast_to(pose.scale, 3) for pose in each] for each in poses], np.float64),
         seconds=(np.arange(len(frames))) / edit.timeline.fps,
         place=edit.place.matrix,
+        camera=camera_of(edit, frames),
     )
+
+
+def camera_of(edit: Edit, frames: range) -> CameraTrack | None:
+    """The keyed camera of an edit at frames, in its place; None without camera keys."""
+    poses = [pose for frame in frames if (pose := edit.timeline.camera_at(frame)) is not None]
+    return camera_track(poses, edit.place) if poses else None

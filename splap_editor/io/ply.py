@@ -13,9 +13,9 @@ from splap_editor.core.pose import LARGEST_COORDINATE
 from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.splats.splats import Splats
 from splap_editor.io.atomic_file import atomic_file
-from splap_editor.io.formats.bare_splats import THIN_LOG_SCALE
+from splap_editor.io.formats.bare_splats import THIN_LOG_SCALE, bare_splats
 from splap_editor.io.layout import COMMON_NAMES, SPLATS_SHARE, Layout, PlyEvidence
-from splap_editor.io.layouts import layout_of, require_splats
+from splap_editor.io.layouts import LAYOUTS, layout_of, require_splats
 from splap_editor.io.lint import unusable_rows
 from splap_editor.io.ply_header import PlyError
 from splap_editor.io.ply_reader import read_table
@@ -52,6 +52,12 @@ class SplatFile:
     layout: Layout
     warnings: list[str]
     format_name: str = "ply"
+
+    @property
+    def is_misread(self) -> bool:
+        """Whether a program that only knows INRIA's 3DGS refuses its layout or takes its numbers for others."""
+        is_filtered = self.splats.filter_radii is not None
+        return self.splats.n_scales == 2 or self.layout.activated_opacity or is_filtered
 
 
 def read_ply(path: str | os.PathLike[str], *, layout: str | None = None, progress: Progress = no_progress) -> SplatFile:
@@ -189,7 +195,8 @@ def write_ply(
     removed : (N,) bool, optional
         Rows that are left out of the file; those that stay keep their bytes and their order.
     as_3dgs : bool
-        Give 2DGS splats a third scale of 1e-6, for programs that know only 3DGS.
+        Write what programs that know only 3DGS read rightly. 2DGS splats get a third scale of 1e-6 and keep all else;
+        of SpikingGS and of files with a 3-D filter a plain 3DGS file is made, of what all programs hold.
     extra : dict of (N,) float, optional
         Columns to add at the end, by name.
     progress : Progress
@@ -206,7 +213,12 @@ def write_ply(
     kept = kept_rows(removed, file)
     table, rest = file.table, file.splats
     names = file.layout.columns
-    if names is None and (as_3dgs or extra or kept is not None or any_stored_difference(rest, splats)):
+    layout = file.layout
+    if as_3dgs and file.is_misread and rest.n_scales == 3:
+        _require_no_overflow(splats, rest, table.name)
+        rest = splats = bare_splats(splats)[0]
+        table, names, layout = plain_table(table.name, splats), COMMON_NAMES, LAYOUTS["3dgs"]
+    elif names is None and (as_3dgs or extra or kept is not None or any_stored_difference(rest, splats)):
         _require_no_overflow(splats, rest, table.name)
         table, names, rest = plain_table(table.name, splats), COMMON_NAMES, splats
     added: list[NewColumn] = []
@@ -215,7 +227,7 @@ def write_ply(
     else:
         columns = splat_columns(table, names)
         added = _added_columns(table, columns if as_3dgs else None, extra or {})
-        blocks = table.blocks(SplatCells(columns, file.layout, rest, splats, table).changes, added, kept)
+        blocks = table.blocks(SplatCells(columns, layout, rest, splats, table).changes, added, kept)
     n_rows = table.n_rows if kept is None else int(np.count_nonzero(kept))
     header = table.header.with_columns([(column.after, column.name) for column in added], n_rows)
     _write_blocks(Path(path), header, blocks, table.body.nbytes, progress)

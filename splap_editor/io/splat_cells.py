@@ -205,12 +205,12 @@ def blank_table(name: str, n_splats: int, n_coefficients: int, n_scales: int = 3
         tuple(f"rot_{i}" for i in range(4)),
     ]
     names = [column for columns in groups for column in columns]
-    rows = np.empty((n_splats, len(names)), "<f4")
+    # The normals stay zero, and no page is touched before it is filled.
+    rows = np.zeros((n_splats, len(names)), "<f4")
     ends = np.cumsum([len(columns) for columns in groups])
-    means, normals, sh0, rest, opacities, log_scales, quats = (
+    means, _, sh0, rest, opacities, log_scales, quats = (
         rows[:, end - len(columns) : end] for columns, end in zip(groups, ends, strict=True)
     )
-    normals[...] = 0
     sheet = Splats(
         means=means,
         log_scales=log_scales,

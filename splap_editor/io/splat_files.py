@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, BinaryIO
 
 from numpy.typing import ArrayLike
 
+from splap_editor.core.camera_path import CameraTrack
 from splap_editor.core.index_spaces import FileMask
 from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.splats.splats import Splats
@@ -102,7 +103,12 @@ def are_splats(path: Path) -> bool:
 
 
 def losses_of_saving(
-    file: SplatFile, row: SplatFormat, splats: Splats | None = None, *, progress: Progress = no_progress
+    file: SplatFile,
+    row: SplatFormat,
+    splats: Splats | None = None,
+    *,
+    as_3dgs: bool = False,
+    progress: Progress = no_progress,
 ) -> list[str]:
     """Say what saving a file's splats in a format loses, each as a sentence.
 
@@ -112,9 +118,13 @@ def losses_of_saving(
     row : SplatFormat
     splats : Splats, optional
         The file's splats, deformed.
+    as_3dgs : bool
+        As of `write_splats`.
     progress : Progress
         May cancel.
     """
+    if row.is_lossless and as_3dgs and file.is_misread and file.splats.n_scales == 3:
+        row = replace(row, name="3dgs", largest_degree=3)
     if row.is_lossless or _is_kept(file, row):
         return []
     splats = file.splats if splats is None else splats
@@ -196,6 +206,7 @@ def write_animation(
     rate: float,
     *,
     removed: FileMask | None = None,
+    camera: CameraTrack | None = None,
 ) -> None:
     """Write the frames of an animation to one file, whole or not at all.
 
@@ -211,6 +222,8 @@ def write_animation(
         Frames per second.
     removed : FileMask, optional
         As of `write_splats`.
+    camera : CameraTrack, optional
+        At each frame.
 
     Raises
     ------
@@ -224,7 +237,7 @@ def write_animation(
         for number, splats in frames:
             yield number, bare_splats(splats if kept is None else splats.at(kept), row.largest_degree)[0]
 
-    _write_whole(Path(path), lambda out: row.write_frames(out, bared(), rate))
+    _write_whole(Path(path), lambda out: row.write_frames(out, bared(), rate, camera))
 
 
 def write_skinned(

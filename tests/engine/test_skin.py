@@ -10,6 +10,7 @@ import pytest
 
 from splap_editor.core.adaptation.options import AdaptationOptions
 from splap_editor.core.bbw.options import BbwOptions
+from splap_editor.core.camera_path import CameraPose
 from splap_editor.core.options import OptionSet
 from splap_editor.core.place import Place
 from splap_editor.core.reach_options import ReachOptions
@@ -43,16 +44,37 @@ class Player:
         values = np.frombuffer(self.buffer, dtype, item["count"] * width, view["byteOffset"])
         return values.reshape(-1, width)
 
-    def positions(self, seconds: float) -> np.ndarray:
+    def nodes(self, seconds: float) -> list[dict]:
         nodes = json.loads(json.dumps(self.held["nodes"]))
         animation = self.held["animations"][0]
         for channel in animation["channels"]:
-            sampler = animation["samplers"][channel["sampler"]]
-            times, values = self.accessor(sampler["input"])[:, 0], self.accessor(sampler["output"])
-            value = np.array([np.interp(seconds, times, values[:, c]) for c in range(values.shape[1])])
-            if channel["target"]["path"] == "rotation":
+            value, target = self.value(animation["samplers"][channel["sampler"]], seconds), channel["target"]
+            if target["path"] == "pointer":
+                continue
+            if target["path"] == "rotation":
                 value /= np.linalg.norm(value)
-            nodes[channel["target"]["node"]][channel["target"]["path"]] = value.tolist()
+            nodes[target["node"]][target["path"]] = value.tolist()
+        return nodes
+
+    def value(self, sampler: dict, seconds: float) -> np.ndarray:
+        times, values = self.accessor(sampler["input"])[:, 0], self.accessor(sampler["output"])
+        return np.array([np.interp(seconds, times, values[:, c]) for c in range(values.shape[1])])
+
+    def pointed(self, pointer: str, seconds: float) -> float:
+        animation = self.held["animations"][0]
+        for channel in animation["channels"]:
+            extension = channel["target"].get("extensions", {}).get("KHR_animation_pointer")
+            if extension == {"pointer": pointer}:
+                return float(self.value(animation["samplers"][channel["sampler"]], seconds)[0])
+        raise AssertionError(f"nothing moves {pointer}")
+
+    def camera(self, seconds: float) -> np.ndarray:
+        nodes = self.nodes(seconds)
+        number = next(number for number, node in enumerate(nodes) if "camera" in node)
+        return self._worlds(nodes)[number]
+
+    def positions(self, seconds: float) -> np.ndarray:
+        nodes = self.nodes(seconds)
         skin = self.held["skins"][0]
         inverse = self.accessor(skin["inverseBindMatrices"]).reshape(-1, 4, 4).transpose(0, 2, 1).astype(float)
         world = self._worlds(nodes)
@@ -145,3 +167,37 @@ def test_a_method_without_weights_makes_no_skin(tmp_path, file, surface):
     with pytest.raises(FormatError, match="bounded biharmonic weights"):
         write_frames(poser, file, range(1, 3), tmp_path / "out.glb")
     assert not (tmp_path / "out.glb").exists()
+
+
+@pytest.mark.parametrize("is_parallel", [False, True])
+def test_the_camera_films_in_another_program_what_it_films_here(tmp_path, surface, file, is_parallel):
+    place = Place(translate=(1.0, 2.0, 3.0), rotate=TURN, scale=2.0)
+    near = CameraPose((3.0, 0.5, 0.2), (0.1, 0.0, 0.3), angle=30.0, is_parallel=is_parallel)
+    far = CameraPose((-1.0, 4.0, 2.0), (0.0, 0.1, 0.0), (0.0, 0.2, 1.0), 50.0, is_parallel)
+    edit = edit_of(surface)
+    timeline = edit.timeline.with_camera_key(1, near).with_camera_key(9, far)
+    edit = dataclasses.replace(edit, timeline=timeline, place=place)
+    write_frames(frame_poser(surface, edit), file, range(1, 10), tmp_path / "out.glb")
+    player = Player(tmp_path / "out.glb")
+    kind = "orthographic" if is_parallel else "perspective"
+    assert player.held["cameras"][0]["type"] == kind
+    assert "KHR_animation_pointer" in player.held["extensionsUsed"]
+    for frame in (1, 5, 9):
+        pose, seconds = timeline.camera_at(frame), (frame - 1) / timeline.fps
+        # What stands in the middle of the picture, and at the middle of its upper edge, in the file's coordinates.
+        half = pose.distance * np.tan(np.radians(pose.angle) / 2)
+        seen = np.array([pose.target, np.array(pose.target) + half * pose.matrix[:3, 1]])
+        seen = (seen @ place.matrix[:3, :3].T + place.matrix[:3, 3]) * [-1, -1, 1]
+        x, y, z = np.linalg.inv(player.camera(seconds))[:3] @ np.column_stack([seen, [1, 1]]).T
+        if is_parallel:
+            y = y / player.pointed("/cameras/0/orthographic/ymag", seconds)
+        else:
+            y = y / -z / np.tan(player.pointed("/cameras/0/perspective/yfov", seconds) / 2)
+        np.testing.assert_allclose([x, y], [[0, 0], [0, 1]], atol=1e-4)
+        assert (z < 0).all()
+
+
+def test_without_camera_keys_there_is_no_camera(tmp_path, file, surface):
+    write_frames(frame_poser(surface, edit_of(surface)), file, range(1, 3), tmp_path / "out.glb")
+    held = Player(tmp_path / "out.glb").held
+    assert "cameras" not in held and held["extensionsUsed"] == ["KHR_gaussian_splatting"]

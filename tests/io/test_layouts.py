@@ -3,12 +3,15 @@
 from dataclasses import replace
 
 import numpy as np
+import plyfile
 import pytest
 
+from splap_editor.io.formats.table import FORMATS
 from splap_editor.io.layout import CHOSEN, COMMON_NAMES, ColumnNames, Layout
 from splap_editor.io.layouts import LAYOUTS, suiting_layouts
 from splap_editor.io.ply import PlyError, read_ply, write_ply
 from splap_editor.io.splat_columns import plain_splats
+from splap_editor.io.splat_files import losses_of_saving, write_splats
 from tests.reference.ply import compressed_bytes, ply_bytes, splat_columns
 
 FLAT = np.full(20, -1e10, "f4")
@@ -177,3 +180,35 @@ def test_a_new_layout_is_one_row(tmp_path, monkeypatch):
     path.write_bytes(ply_bytes({"alpha": SHARE, "s0": SHARE}))
     with pytest.raises(PlyError, match="lacks the columns px, py, pz, s1"):
         read_ply(path)
+
+
+@pytest.mark.parametrize("name", ["spikinggs", "gof"])
+def test_what_3dgs_programs_would_misread_is_made_plain_for_them(tmp_path, name):
+    path, out = tmp_path / "own.ply", tmp_path / "out.ply"
+    path.write_bytes(FILES[name]())
+    file = read_ply(path)
+    assert file.is_misread
+    splats = replace(file.splats, means=file.splats.means + 1)
+    write_splats(out, file, splats, as_3dgs=True)
+    plain = plyfile.PlyData.read(out)["vertex"]
+    # By INRIA's own formulas, and its columns alone.
+    np.testing.assert_allclose(1 / (1 + np.exp(-plain["opacity"].astype(float))), splats.opacities, atol=1e-6)
+    scales = np.column_stack([np.exp(plain[f"scale_{c}"]) for c in range(3)])
+    np.testing.assert_allclose(scales, np.maximum(splats.scales, 1e-6), rtol=1e-4)
+    np.testing.assert_allclose(plain["x"], splats.means[:, 0], rtol=1e-6)
+    assert "filter_3D" not in plain.data.dtype.names
+    again = read_ply(out)
+    assert not again.is_misread and again.splats.filter_radii is None
+    told = losses_of_saving(file, FORMATS["ply"], as_3dgs=True)
+    assert not losses_of_saving(file, FORMATS["ply"])
+    assert any("filter_3D" in loss or "thinner" in loss for loss in told)
+
+
+def test_layouts_that_all_read_are_left_as_they_are(tmp_path):
+    path, out = tmp_path / "own.ply", tmp_path / "out.ply"
+    for name in ("3dgs", "brush", "supersplat", "gaussian-surfels"):
+        path.write_bytes(FILES[name]())
+        file = read_ply(path)
+        assert not file.is_misread
+        write_splats(out, file, file.splats, as_3dgs=True)
+        assert out.read_bytes() == path.read_bytes()

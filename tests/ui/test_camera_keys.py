@@ -53,6 +53,9 @@ def camera_mark(strip, frame):
 def test_camera_keys_are_set_shown_and_looked_through(driver):
     strip = with_camera(driver)
     assert strip.isVisible() and driver.session.history.undo_label == "Key camera"
+    # In the least window that is supported the ruler has a line of its own, as wide as the picture.
+    driver.qtbot.waitUntil(lambda: strip.ruler.width() > 0.9 * strip.width(), timeout=WAIT_MS)
+    assert strip.ruler.y() >= strip.frame_field.geometry().bottom()
     assert driver.scene.edit.timeline.camera_key_frames == (1, LAST)
     last = eye(driver)
     driver.window.timeline_actions.go_to(1)

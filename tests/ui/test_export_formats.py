@@ -1,7 +1,9 @@
 """The dialogs of exports tell the formats apart, and what each loses."""
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
@@ -84,9 +86,28 @@ def held_up(worker: Worker):
 
 def test_a_file_of_two_scales_says_who_reads_it_until_it_gets_a_third(dialog):
     choice = dialog.choice
-    assert "SuperSplat" in choice.losses.text() and choice.third_scale.isVisible()
-    QTest.mouseClick(choice.third_scale, Qt.MouseButton.LeftButton, pos=choice.third_scale.rect().center() / 4)
+    assert "SuperSplat" in choice.losses.text() and choice.plain.isVisible()
+    QTest.mouseClick(choice.plain, Qt.MouseButton.LeftButton, pos=choice.plain.rect().center() / 4)
     assert not choice.losses.isVisible() and dialog.as_3dgs
+
+
+def test_a_layout_that_others_misread_is_offered_as_a_plain_one_and_its_losses_are_said(
+    qtbot, tmp_path, flat_file, worker
+):
+    filtered = np.full(flat_file.splats.n_splats, 0.01)
+    scales = np.column_stack([flat_file.splats.log_scales, np.full(flat_file.splats.n_splats, -5.0)])
+    file = replace(flat_file, splats=replace(flat_file.splats, log_scales=scales, filter_radii=filtered))
+    dialog = FramesDialog(None, file, Timeline(), (80, 60), lambda order: None, worker)
+    dialog.show()
+    dialog.kind.setCurrentIndex(dialog.kind.findData("splats"))
+    choice = dialog.choice
+    assert "3-D filter" in choice.losses.text() and choice.plain.isVisible()
+    choice.plain.setChecked(True)
+    wait_told(qtbot, choice)
+    assert choice.as_3dgs and "Lost: The filter_3D column is worked into" in choice.losses.text()
+    choose(choice, "spz")
+    assert not choice.as_3dgs and not choice.plain.isVisible()
+    dialog.reject()
 
 
 @pytest.mark.parametrize(("name", "ending"), [("spz", ".spz"), ("sog", ".sog"), ("gltf", ".glb")])
@@ -95,7 +116,7 @@ def test_a_format_chosen_changes_the_ending_and_says_what_is_lost(dialog, qtbot,
     assert dialog.path == tmp_path / f"out{ending}"
     wait_told(qtbot, dialog.choice)
     assert "Lost: Flat splats" in dialog.choice.losses.text()
-    assert not dialog.choice.third_scale.isVisible() and not dialog.as_3dgs and dialog.column_names == ()
+    assert not dialog.choice.plain.isVisible() and not dialog.as_3dgs and dialog.column_names == ()
     choose(dialog.choice, "compressed-ply")
     assert dialog.path == tmp_path / "out.compressed.ply"
     choose(dialog.choice, "ply")
@@ -131,7 +152,7 @@ def test_nothing_is_saved_before_it_is_said_what_that_loses_and_only_the_format_
     go_on()
     qtbot.waitUntil(dialog.accept_button.isEnabled, timeout=WAIT_MS)
     assert "Numbers are rounded" in dialog.choice.losses.text()
-    assert set(dialog.choice._losses) == {"ply", "spz"}
+    assert {name for name, _ in dialog.choice._losses} == {"ply", "spz"}
 
 
 def test_losses_that_cannot_be_told_keep_nobody_from_saving(dialog, qtbot, monkeypatch):
@@ -192,6 +213,6 @@ def test_one_file_of_all_frames_says_that_it_replaces_another(frames_dialog, ord
 
 def test_frames_of_flat_splats_can_have_a_third_scale(frames_dialog, ordered, tmp_path):
     frames_dialog.kind.setCurrentIndex(frames_dialog.kind.findData("splats"))
-    frames_dialog.choice.third_scale.setChecked(True)
+    frames_dialog.choice.plain.setChecked(True)
     frames_dialog.export_to(tmp_path / "out.ply")
     assert ordered[0].as_3dgs

@@ -1,9 +1,11 @@
 """Splats reduced to what every other format holds: three scales, no filter, finite numbers."""
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.progress import Progress, no_progress
+from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.splats.splats import Splats
 
 THIN_LOG_SCALE = float(np.log(1e-6))
@@ -14,6 +16,9 @@ LARGEST_LOG_SCALE = float(np.log(1e30))
 
 LARGEST_COEFFICIENT = np.float32(1e4)
 """Of colours: a coefficient of 2 is white already."""
+
+BLOCK_ROWS = 1 << 15
+"""Rows that are worked on at a time."""
 
 FAINT, OPAQUE = -14.0, 14.0
 """Logits of what counts as invisible and as opaque: a millionth from 0 and from 1."""
@@ -65,28 +70,41 @@ def bare_splats(splats: Splats, largest_degree: int = 3, progress: Progress = no
         quats[unusable] = 1, 0, 0, 0
         log_scales[unusable] = THIN_LOG_SCALE
         logits[unusable] = FAINT
-    progress(0.6)
-    sh0 = _finite(splats.sh0)
-    progress(0.7)
+    progress(0.5)
+    sh0 = _finite(splats.sh0, part_of(progress, 0.5, 0.6))
+    shN = _finite(splats.shN[:, : (largest_degree + 1) ** 2 - 1], part_of(progress, 0.6, 1.0))
     bare = Splats(
         means=np.asarray(splats.means, np.float32),
         log_scales=log_scales,
         quats=quats,
         logit_opacities=logits,
         sh0=sh0,
-        shN=_finite(splats.shN[:, : (largest_degree + 1) ** 2 - 1]),
+        shN=shN,
     )
     progress(1.0)
     return bare, int(unusable.sum())
 
 
-def _finite(values: NDArray[np.floating]) -> NDArray[np.float32]:
+def row_blocks(n_rows: int, progress: Progress) -> Iterator[slice]:
+    """Rows, so many at a time that ``progress`` is told a few times a second; it may cancel between them."""
+    for lo in range(0, n_rows, BLOCK_ROWS):
+        progress(lo / n_rows)
+        yield slice(lo, min(lo + BLOCK_ROWS, n_rows))
+
+
+def _finite(values: NDArray[np.floating], progress: Progress) -> NDArray[np.float32]:
     """Coefficients as float32, zero where they are no numbers, and none so large that reckoning with it overflows."""
+    made: NDArray[np.float32] | None = None
     with np.errstate(over="ignore", invalid="ignore"):
-        cells = np.asarray(values, np.float32)
-    if (np.abs(cells) <= LARGEST_COEFFICIENT).all():
-        return cells
-    return np.clip(np.nan_to_num(cells, nan=0.0, posinf=0.0, neginf=0.0), -LARGEST_COEFFICIENT, LARGEST_COEFFICIENT)
+        for rows in row_blocks(len(values), progress):
+            cells = np.asarray(values[rows], np.float32)
+            is_good = bool((np.abs(cells) <= LARGEST_COEFFICIENT).all())
+            if made is None and (not is_good or values.dtype != np.float32):
+                made = np.array(values, np.float32)
+            if made is not None and not is_good:
+                limits = -LARGEST_COEFFICIENT, LARGEST_COEFFICIENT
+                made[rows] = np.clip(np.nan_to_num(cells, nan=0.0, posinf=0.0, neginf=0.0), *limits)
+    return np.asarray(values, np.float32) if made is None else made
 
 
 def alphas_of(logits: NDArray[np.floating]) -> NDArray[np.float64]:

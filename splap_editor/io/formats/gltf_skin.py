@@ -6,8 +6,16 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.camera_path import CameraTrack
+from splap_editor.core.splats.rotations import matrices_to_quats
 from splap_editor.core.splats.splats import Splats
 from splap_editor.io.formats.gltf import GlbBuilder, splat_attributes, splat_document
+
+POINTER = "KHR_animation_pointer"
+"""Khronos' extension by which more than nodes is animated; who does not know it leaves those channels out."""
+
+ASPECT = 16 / 9
+"""Width by height of a parallel picture, which a glTF has to say."""
 
 _SMALLEST = 1e-5
 """Weights below this move nothing that can be seen, and are left out."""
@@ -31,6 +39,8 @@ class Skin:
         When.
     place : (4, 4) float
         Where the whole is put, a similarity.
+    camera : CameraTrack, optional
+        At each frame, where the whole is put already.
     """
 
     names: tuple[str, ...]
@@ -41,6 +51,7 @@ class Skin:
     scales: NDArray[np.float64]
     seconds: NDArray[np.float64]
     place: NDArray[np.float64]
+    camera: CameraTrack | None = None
 
     def blended(self, means: NDArray[np.floating], frame: int) -> NDArray[np.float64]:
         """Where a program that plays the skin puts points at rest, before the whole is put in its place."""
@@ -77,27 +88,77 @@ def write(out: BinaryIO, splats: Splats, skin: Skin) -> None:
     mesh = {"mesh": 0, "skin": 0, "name": "splats"}
     document["nodes"] = [{"rotation": turned, "children": [1]}, place, *joints, {"name": "rest"}, mesh]
     document["skins"] = [{"joints": [*range(first, first + n_joints + 1)], "inverseBindMatrices": bind, "skeleton": 0}]
-    document["animations"] = [_animation(builder, skin, first)]
+    animation = _Animation(builder, skin.seconds)
+    for joint in range(n_joints):
+        animation.move(first + joint, "translation", skin.centers[joint] + skin.translations[:, joint])
+        animation.move(first + joint, "rotation", _turns(skin.rotations[:, joint]))
+        animation.move(first + joint, "scale", skin.scales[:, joint])
+    if skin.camera is not None:
+        _add_camera(document, animation, skin.camera)
+    document["animations"] = [animation.held]
     builder.write(out, document)
 
 
-def _animation(builder: GlbBuilder, skin: Skin, first: int) -> dict[str, Any]:
-    """Channels of all joints, one key a frame."""
-    ends = {"min": [float(skin.seconds.min())], "max": [float(skin.seconds.max())]}
-    times = builder.add(skin.seconds.astype("<f4"), **ends)
-    samplers, channels = [], []
-    for joint in range(len(skin.names)):
-        moved = skin.centers[joint] + skin.translations[:, joint]
-        turns = skin.rotations[:, joint].copy()
-        # The shorter way between neighbours.
-        for frame in range(1, len(turns)):
-            if turns[frame] @ turns[frame - 1] < 0:
-                turns[frame] *= -1
-        paths = {"translation": moved, "rotation": turns[:, [1, 2, 3, 0]], "scale": skin.scales[:, joint]}
-        for path, values in paths.items():
-            samplers.append({"input": times, "output": builder.add(values.astype("<f4")), "interpolation": "LINEAR"})
-            channels.append({"sampler": len(samplers) - 1, "target": {"node": first + joint, "path": path}})
-    return {"name": "timeline", "samplers": samplers, "channels": channels}
+class _Animation:
+    """Channels of nodes and cameras, one key a frame."""
+
+    def __init__(self, builder: GlbBuilder, seconds: NDArray[np.float64]) -> None:
+        self._builder = builder
+        ends = {"min": [float(seconds.min())], "max": [float(seconds.max())]}
+        self._times = builder.add(seconds.astype("<f4"), **ends)
+        self._samplers: list[dict[str, Any]] = []
+        self._channels: list[dict[str, Any]] = []
+
+    @property
+    def held(self) -> dict[str, Any]:
+        """Its JSON."""
+        return {"name": "timeline", "samplers": self._samplers, "channels": self._channels}
+
+    def move(self, node: int, path: str, values: NDArray[np.floating]) -> None:
+        """Move a property of a node."""
+        self._add({"node": node, "path": path}, values)
+
+    def change(self, pointer: str, values: NDArray[np.floating]) -> None:
+        """Change another number of the document, for programs that know `POINTER`."""
+        self._add({"path": "pointer", "extensions": {POINTER: {"pointer": pointer}}}, values)
+
+    def _add(self, target: dict[str, Any], values: NDArray[np.floating]) -> None:
+        output = self._builder.add(values.astype("<f4"))
+        self._samplers.append({"input": self._times, "output": output, "interpolation": "LINEAR"})
+        self._channels.append({"sampler": len(self._samplers) - 1, "target": target})
+
+
+def _turns(quats: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Rotations w, x, y, z as glTF has them, the shorter way between neighbours."""
+    turns = quats.copy()
+    for frame in range(1, len(turns)):
+        if turns[frame] @ turns[frame - 1] < 0:
+            turns[frame] *= -1
+    return turns[:, [1, 2, 3, 0]]
+
+
+def _add_camera(document: dict[str, Any], animation: _Animation, camera: CameraTrack) -> None:
+    """Add a camera under the turned node, and how it moves; its lens moves where a program knows `POINTER`."""
+    near, far = camera.clipping
+    y_halves, angles = camera.heights / 2, np.radians(camera.angles)
+    lens: dict[str, Any] = {"znear": near, "zfar": far}
+    if camera.is_parallel:
+        kind, moving = "orthographic", {"ymag": y_halves, "xmag": y_halves * ASPECT}
+    else:
+        kind, moving = "perspective", {"yfov": angles}
+    lens |= {name: float(values[0]) for name, values in moving.items()}
+    document["cameras"] = [{"type": kind, kind: lens, "name": "camera"}]
+    number = len(document["nodes"])
+    turns, places = _turns(matrices_to_quats(camera.matrices[:, :3, :3])), camera.matrices[:, :3, 3]
+    node = {"name": "camera", "camera": 0, "translation": places[0].tolist(), "rotation": turns[0].tolist()}
+    document["nodes"].append(node)
+    document["nodes"][0]["children"].append(number)
+    animation.move(number, "translation", places)
+    animation.move(number, "rotation", turns)
+    for name, values in moving.items():
+        if np.ptp(values) > 1e-6 * abs(float(values[0])):
+            animation.change(f"/cameras/0/{kind}/{name}", values)
+            document["extensionsUsed"] = sorted({*document["extensionsUsed"], POINTER})
 
 
 def _sets(weights: NDArray[np.floating]) -> list[tuple[NDArray[np.uint16], NDArray[np.float32]]]:

@@ -8,7 +8,7 @@ import json
 import math
 import zipfile
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any, BinaryIO, TypeVar
 
 import numpy as np
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from splap_editor.core.progress import Cancelled, Progress, part_of
 from splap_editor.core.splats.morton import morton_order
 from splap_editor.core.splats.splats import Splats
-from splap_editor.io.formats.bare_splats import alphas_of, as_bytes, logits_of_bytes
+from splap_editor.io.formats.bare_splats import alphas_of, as_bytes, logits_of_bytes, row_blocks
 from splap_editor.io.formats.palettes import codebook, palette
 from splap_editor.io.formats.source import FormatError, Source
 from splap_editor.io.ply_table import PlyTable
@@ -28,7 +28,6 @@ Result = TypeVar("Result")
 _WIDTHS = {3: 192, 8: 512, 15: 960}
 """Pixels across a palette, 64 entries side by side, by the coefficients of an entry."""
 _PARTS, _MARKS = (b'"means"', b'"scales"', b'"quats"', b'"sh0"', b'"shN"'), (b'.webp"', b'"codebook"', b'"mins"')
-_BLOCK_ROWS = 1 << 15
 _LARGEST_META = 1 << 22
 _LARGEST_PICTURE = 1 << 30
 _IDENTITY_BELOW = 252
@@ -82,7 +81,7 @@ def _read(archive: "_Archive", progress: Progress) -> tuple[PlyTable, list[str]]
     progress(0.1)
     _fill_means(sheet, archive, meta, part_of(progress, 0.1, 0.4))
     quats = archive.pixels(_files(archive, meta, "quats", 1)[0], count)
-    for rows in _blocks(count, part_of(progress, 0.4, 0.5)):
+    for rows in row_blocks(count, part_of(progress, 0.4, 0.5)):
         sheet.quats[rows] = _rotations(quats[rows])
     scales = archive.pixels(_files(archive, meta, "scales", 1)[0], count)
     progress(0.5)
@@ -91,7 +90,7 @@ def _read(archive: "_Archive", progress: Progress) -> tuple[PlyTable, list[str]]
         _tables(archive, meta, name, version, n) for name, n in (("scales", 3), ("sh0", 3 if version == 2 else 4))
     ]
     logits = logits_of_bytes() if version == 2 else tables[1][3]
-    for rows in _blocks(count, part_of(progress, 0.6, 0.7)):
+    for rows in row_blocks(count, part_of(progress, 0.6, 0.7)):
         for c in range(3):
             sheet.log_scales[rows, c] = tables[0][c][scales[rows, c]]
             sheet.sh0[rows, c] = tables[1][c][colors[rows, c]]
@@ -100,17 +99,10 @@ def _read(archive: "_Archive", progress: Progress) -> tuple[PlyTable, list[str]]
         labels, entries = harmonics
         # A label beyond the palette, of which some writers have a few, shows no view-dependence.
         entries = np.concatenate([entries, np.zeros((1, n_coefficients, 3), np.float32)])
-        for rows in _blocks(count, part_of(progress, 0.7, 1.0)):
+        for rows in row_blocks(count, part_of(progress, 0.7, 1.0)):
             sheet.shN[rows] = entries[labels[rows]]
     progress(1.0)
     return table, []
-
-
-def _blocks(count: int, progress: Progress) -> Iterator[slice]:
-    """Rows to be filled at a time; ``progress`` may cancel between them."""
-    for lo in range(0, count, _BLOCK_ROWS):
-        progress(lo / count)
-        yield slice(lo, min(lo + _BLOCK_ROWS, count))
 
 
 class _Archive(ABC):
@@ -249,7 +241,7 @@ def _fill_means(sheet: Splats, archive: _Archive, meta: dict[str, Any], progress
     progress(0.3)
     high = archive.pixels(high_name, sheet.n_splats)
     least, most = (_numbers(archive, meta, "means", key, 3) for key in ("mins", "maxs"))
-    for rows in _blocks(sheet.n_splats, part_of(progress, 0.6, 1.0)):
+    for rows in row_blocks(sheet.n_splats, part_of(progress, 0.6, 1.0)):
         for c in range(3):
             share = (low[rows, c] + high[rows, c].astype(np.uint16) * 256) / 65535
             value = least[c] + ((most[c] - least[c]) or 1.0) * share

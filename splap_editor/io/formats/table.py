@@ -6,6 +6,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import BinaryIO
 
+from splap_editor.core.camera_path import CameraTrack
 from splap_editor.core.progress import Progress
 from splap_editor.core.splats.splats import Splats
 from splap_editor.io.formats.bare_splats import THIN_LOG_SCALE
@@ -107,16 +108,19 @@ class SplatFormat:
         write: Callable[[BinaryIO, Splats, Progress], None] = _function(self.writes)
         write(out, splats, progress)
 
-    def write_frames(self, out: BinaryIO, frames: Iterable[tuple[int, Splats]], rate: float) -> None:
-        """Encode bare splats at each frame of an animation, ``rate`` frames a second.
+    def write_frames(
+        self, out: BinaryIO, frames: Iterable[tuple[int, Splats]], rate: float, camera: CameraTrack | None
+    ) -> None:
+        """Encode bare splats at each frame of an animation, ``rate`` frames a second, and a camera that films them.
 
         Raises
         ------
         FormatError
             As of `write`.
         """
-        write: Callable[[BinaryIO, Iterable[tuple[int, Splats]], float], None] = _function(self.writes_frames)
-        write(out, frames, rate)
+        write: Callable[[BinaryIO, Iterable[tuple[int, Splats]], float, CameraTrack | None], None]
+        write = _function(self.writes_frames)
+        write(out, frames, rate, camera)
 
 
 def _function(path: str) -> Callable:

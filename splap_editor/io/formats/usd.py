@@ -14,16 +14,20 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from splap_editor.core.progress import Progress, no_progress
+from splap_editor.core.camera_path import CameraTrack
+from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.splats.splats import Splats
-from splap_editor.io.formats.bare_splats import FAINT, OPAQUE, alphas_of
+from splap_editor.io.formats.bare_splats import FAINT, OPAQUE, alphas_of, row_blocks
 from splap_editor.io.formats.source import FormatError, Source
 from splap_editor.io.formats.splat32 import log_scales_of
 from splap_editor.io.npz import NpzError, NpzFile
 from splap_editor.io.ply_table import PlyTable
 from splap_editor.io.splat_cells import blank_table
 
-_ROOT, _PRIM = "/World", "/World/Splats"
+_ROOT, _PRIM, _CAMERA = "/World", "/World/Splats", "/World/Camera"
+_APERTURE, _ASPECT = 15.2908, 16 / 9
+"""Height of a camera's film in tenths of a unit, USD's own default, and its width by its height."""
+
 _SECONDS = 600.0
 _MOST_BYTES = 1 << 34
 _MISSING = "OpenUSD files need the package usd-core: install it with pip install 'splap-editor[usd]'."
@@ -52,21 +56,22 @@ def read(source: Source, progress: Progress) -> tuple[PlyTable, list[str]]:
             raise source.refused(*told) if told else source.damaged("its library gave up on it")
         try:
             with held.open("rb") as file:
-                archive = NpzFile(file, _MOST_BYTES)
+                archive = NpzFile(file, _MOST_BYTES, lambda share: progress(0.5))
                 arrays = {name: archive.array(name) for name in archive.names}
         except NpzError as error:
             raise source.damaged(str(error)) from None
     means, harmonics = arrays["means"], arrays["harmonics"]
     n, n_coefficients = len(means), harmonics.shape[1] - 1
     table, sheet = blank_table(source.name, n, n_coefficients)
-    sheet.means[...] = means
-    sheet.log_scales[...] = log_scales_of(arrays["scales"])
-    sheet.quats[...] = arrays["quats"]
-    alphas = arrays["alphas"].astype(np.float64)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        sheet.logit_opacities[...] = np.clip(np.log(alphas) - np.log1p(-alphas), FAINT, OPAQUE)
-    sheet.sh0[...] = harmonics[:, 0]
-    sheet.shN[...] = harmonics[:, 1:]
+    for rows in row_blocks(n, part_of(progress, 0.5, 1.0)):
+        sheet.means[rows] = means[rows]
+        sheet.log_scales[rows] = log_scales_of(arrays["scales"][rows])
+        sheet.quats[rows] = arrays["quats"][rows]
+        alphas = arrays["alphas"][rows].astype(np.float64)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            sheet.logit_opacities[rows] = np.clip(np.log(alphas) - np.log1p(-alphas), FAINT, OPAQUE)
+        sheet.sh0[rows] = harmonics[rows, 0]
+        sheet.shN[rows] = harmonics[rows, 1:]
     progress(1.0)
     return table, ["It is animated: these are the splats of its first frame."] if arrays["is_animated"] else []
 
@@ -105,14 +110,18 @@ def write_usdz(out: BinaryIO, splats: Splats, progress: Progress) -> None:
     progress(1.0)
 
 
-def write_usdc_frames(out: BinaryIO, frames: Iterable[tuple[int, Splats]], rate: float) -> None:
-    """Encode an animation as a ``.usdc``."""
-    _write(out, frames, rate, is_package=False)
+def write_usdc_frames(
+    out: BinaryIO, frames: Iterable[tuple[int, Splats]], rate: float, camera: CameraTrack | None
+) -> None:
+    """Encode an animation, and the camera that films it, as a ``.usdc``."""
+    _write(out, frames, rate, is_package=False, camera=camera)
 
 
-def write_usdz_frames(out: BinaryIO, frames: Iterable[tuple[int, Splats]], rate: float) -> None:
-    """Encode an animation as a ``.usdz``."""
-    _write(out, frames, rate, is_package=True)
+def write_usdz_frames(
+    out: BinaryIO, frames: Iterable[tuple[int, Splats]], rate: float, camera: CameraTrack | None
+) -> None:
+    """Encode an animation, and the camera that films it, as a ``.usdz``."""
+    _write(out, frames, rate, is_package=True, camera=camera)
 
 
 def _write(
@@ -121,6 +130,7 @@ def _write(
     rate: float,
     *,
     is_package: bool,
+    camera: CameraTrack | None = None,
     progress: Progress = no_progress,
 ) -> None:
     """Encode bare splats as a stage, time-sampled where there is more than one frame.
@@ -134,6 +144,8 @@ def _write(
         Frames per second.
     is_package : bool
         A ``.usdz``, which wraps a ``.usdc``.
+    camera : CameraTrack, optional
+        At each frame.
     progress : Progress
         Told between arrays, and for each MiB written, of one frame.
     """
@@ -158,8 +170,7 @@ def _write(
                     attribute = prim.GetAttribute(name)
                     attribute.Clear()
                     attribute.Set(values, numbers[0])
-            arrays = _moving(splats)
-            progress(0.2)
+            arrays = _moving(splats, part_of(progress, 0.0, 0.3))
             for name, values in arrays.items():
                 prim.GetAttribute(name).Set(values, number) if numbers else prim.GetAttribute(name).Set(values)
             kept = arrays if not numbers else {}
@@ -168,6 +179,8 @@ def _write(
                 _set_still(prim, splats)
                 progress(0.5)
             numbers.append(number)
+        if camera is not None:
+            _add_camera(stage, camera, numbers)
         if len(numbers) > 1:
             stage.SetStartTimeCode(numbers[0])
             stage.SetEndTimeCode(numbers[-1])
@@ -183,18 +196,47 @@ def _write(
                 progress(0.9)
 
 
-def _moving(splats: Splats) -> dict[str, Any]:
+def _add_camera(stage: Any, camera: CameraTrack, numbers: list[int]) -> None:
+    """Define a camera beside the splats, time-sampled at frames where there is more than one."""
+    from pxr import Gf, UsdGeom
+
+    prim = UsdGeom.Camera.Define(stage, _CAMERA)
+    prim.CreateClippingRangeAttr(Gf.Vec2f(*camera.clipping))
+    if camera.is_parallel:
+        prim.CreateProjectionAttr(UsdGeom.Tokens.orthographic)
+    place = prim.AddTransformOp()
+    focal = prim.CreateFocalLengthAttr()
+    across, high = prim.CreateHorizontalApertureAttr(), prim.CreateVerticalApertureAttr()
+    half_turn = np.diag([-1.0, -1.0, 1.0, 1.0])
+    for k, number in enumerate(numbers):
+        when = (number,) if len(numbers) > 1 else ()
+        # USD's vectors are rows, and its apertures and focal lengths tenths of a unit.
+        place.Set(Gf.Matrix4d((half_turn @ camera.matrices[k]).T.tolist()), *when)
+        height = 10.0 * float(camera.heights[k]) if camera.is_parallel else _APERTURE
+        high.Set(height, *when)
+        across.Set(height * _ASPECT, *when)
+        if not camera.is_parallel:
+            focal.Set(height / 2 / float(np.tan(np.radians(camera.angles[k]) / 2)), *when)
+
+
+def _moving(splats: Splats, progress: Progress) -> dict[str, Any]:
     """Attributes that change from frame to frame."""
     from pxr import Vt
 
-    harmonics = np.concatenate([splats.sh0[:, None], splats.shN], axis=1).reshape(-1, 3)
     found = {
         "positions": Vt.Vec3fArray.FromNumpy(_floats(splats.means)),
         "scales": Vt.Vec3fArray.FromNumpy(_floats(np.exp(splats.log_scales))),
         "orientations": Vt.QuatfArray.FromNumpy(_floats(splats.quats[:, [1, 2, 3, 0]])),
     }
-    if splats.shN.shape[1]:
-        found["radiance:sphericalHarmonicsCoefficients"] = Vt.Vec3fArray.FromNumpy(_floats(harmonics))
+    progress(0.2)
+    n_coefficients = splats.shN.shape[1]
+    if n_coefficients:
+        harmonics = np.empty((splats.n_splats, 1 + n_coefficients, 3), np.float32)
+        for rows in row_blocks(splats.n_splats, part_of(progress, 0.2, 0.8)):
+            harmonics[rows, 0], harmonics[rows, 1:] = splats.sh0[rows], splats.shN[rows]
+        progress(0.8)
+        found["radiance:sphericalHarmonicsCoefficients"] = Vt.Vec3fArray.FromNumpy(harmonics.reshape(-1, 3))
+    progress(1.0)
     return found
 
 

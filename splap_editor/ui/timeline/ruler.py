@@ -10,7 +10,7 @@ from splap_editor.core.timeline import Timeline
 from splap_editor.ui.theme import ACCENT, FAINT, FIELD, LINE, QUIET, STEP, TEXT
 from splap_editor.ui.widgets.widget_gestures import WidgetGestures
 
-MARGIN = 4 * STEP
+MARGIN = 5 * STEP
 LABEL_PX = 56
 DIAMOND_PX = 5.5
 REACH_PX = 8.0

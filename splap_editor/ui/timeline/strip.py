@@ -1,7 +1,8 @@
 """The strip under the picture: play, keys, frames."""
 
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtWidgets import QHBoxLayout, QToolButton, QWidget
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QGridLayout, QToolButton, QWidget
 
 from splap_editor.core.timeline import LAST_FRAME
 from splap_editor.session.scene_follower import SceneFollower
@@ -12,6 +13,9 @@ from splap_editor.ui.theme import STEP
 from splap_editor.ui.timeline.ruler import TimelineRuler
 from splap_editor.ui.widgets.number_field import NumberField
 from splap_editor.ui.widgets.plain_text import PlainLabel
+
+NARROW_PX = 720
+"""A strip narrower than this has its ruler in a line of its own."""
 
 
 class TimelineStrip(QWidget):
@@ -38,20 +42,26 @@ class TimelineStrip(QWidget):
         self.frame_field = _field("Frame shown", 1, LAST_FRAME)
         self.length_field = _field("Number of frames", 1, LAST_FRAME)
         self.fps_field = _field("Frames per second", 1, 240)
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(2 * STEP, STEP, 2 * STEP, STEP)
-        layout.setSpacing(STEP)
+        self._grid = QGridLayout(self)
+        self._grid.setContentsMargins(2 * STEP, STEP, 2 * STEP, STEP)
+        self._grid.setHorizontalSpacing(STEP)
+        self._grid.setVerticalSpacing(0)
+        line: list[QWidget] = []
         for action_id in ("timeline.play", "timeline.set_key", "timeline.set_camera_key"):
             button = QToolButton()
             button.setDefaultAction(actions[action_id])
             button.setIconSize(QSize(18, 18))
-            layout.addWidget(button)
-        layout.addWidget(self.frame_field)
-        layout.addWidget(self.ruler, 1)
-        layout.addWidget(self.length_field)
-        layout.addWidget(PlainLabel("at"))
-        layout.addWidget(self.fps_field)
-        layout.addWidget(PlainLabel("fps"))
+            line.append(button)
+        line.append(self.frame_field)
+        self._column = len(line)
+        for k, widget in enumerate(line):
+            self._grid.addWidget(widget, 0, k)
+        after = (self.length_field, PlainLabel("at"), self.fps_field, PlainLabel("fps"))
+        for k, widget in enumerate(after, self._column + 1):
+            self._grid.addWidget(widget, 0, k)
+        self._grid.setColumnStretch(self._column, 1)
+        self._is_narrow: bool | None = None
+        self._arrange(is_narrow=False)
         self.ruler.scrubbed.connect(timeline.scrub)
         self.ruler.chosen.connect(timeline.go_to)
         self.ruler.key_moved.connect(timeline.move_key)
@@ -65,6 +75,21 @@ class TimelineStrip(QWidget):
         timeline.player.playing_changed.connect(lambda on: actions.check("timeline.play", on))
         SceneFollower(session, self._show, edit_changed=self._show, preview_changed=self._show)
         self.hide()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Put the ruler between the fields, or under them where they leave it too little room."""
+        self._arrange(is_narrow=event.size().width() < NARROW_PX)
+        super().resizeEvent(event)
+
+    def _arrange(self, *, is_narrow: bool) -> None:
+        if is_narrow == self._is_narrow:
+            return
+        self._is_narrow = is_narrow
+        self._grid.removeWidget(self.ruler)
+        if is_narrow:
+            self._grid.addWidget(self.ruler, 1, 0, 1, self._grid.columnCount())
+        else:
+            self._grid.addWidget(self.ruler, 0, self._column)
 
     def _show(self) -> None:
         timeline = self._session.shown_scene.shown_edit.timeline

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from pxr import Usd, UsdGeom, Vt
 
+from splap_editor.core.camera_path import CameraPose, camera_track
+from splap_editor.core.place import Place
 from splap_editor.core.progress import Cancelled
 from splap_editor.io.formats import usd
 from splap_editor.io.formats.source import FormatError
@@ -39,6 +41,30 @@ def test_an_animation_is_one_time_sampled_file(tmp_path, scene, ending):
     first = read_splats(path)
     np.testing.assert_allclose(first.splats.means, frames[0][1].means, atol=1e-6)
     assert any("first frame" in warning for warning in first.warnings)
+
+
+@pytest.mark.parametrize("is_parallel", [False, True])
+@pytest.mark.parametrize("numbers", [(3, 4, 7), (5,)])
+def test_the_camera_of_a_stage_films_what_it_films_here(tmp_path, scene, is_parallel, numbers):
+    poses = [
+        CameraPose((3.0, 0.5, number), (0.1, 0.0, 0.3), (0.0, 0.1, 1.0), 20.0 + number, is_parallel)
+        for number in numbers
+    ]
+    place = Place(translate=(1.0, 2.0, 3.0), rotate=(0.8, 0.0, 0.6, 0.0), scale=2.0)
+    frames = [(number, scene.splats) for number in numbers]
+    write_animation(tmp_path / "film.usdc", scene, frames, 24.0, camera=camera_track(poses, place))
+    stage = Usd.Stage.Open(str(tmp_path / "film.usdc"))
+    camera = UsdGeom.Camera(stage.GetPrimAtPath("/World/Camera"))
+    for number, pose in zip(numbers, poses, strict=True):
+        frustum = camera.GetCamera(number).frustum
+        to_picture = np.array(frustum.ComputeViewMatrix()) @ np.array(frustum.ComputeProjectionMatrix())
+        half = pose.distance * np.tan(np.radians(pose.angle) / 2)
+        seen = np.array([pose.target, np.array(pose.target) + half * pose.matrix[:3, 1]])
+        seen = (seen @ place.matrix[:3, :3].T + place.matrix[:3, 3]) * [-1, -1, 1]
+        pixels = np.column_stack([seen, [1, 1]]) @ to_picture
+        np.testing.assert_allclose(pixels[:, :2] / pixels[:, 3:], [[0, 0], [0, 1]], atol=1e-5)
+        assert (np.abs(pixels[:, 2] / pixels[:, 3]) < 1).all()
+    assert read_splats(tmp_path / "film.usdc").splats.n_splats == scene.splats.n_splats
 
 
 def test_a_still_file_has_no_time_samples(tmp_path, scene):
