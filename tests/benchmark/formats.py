@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -19,7 +20,7 @@ import numpy as np
 
 from splap_editor.core.progress import Progress
 from splap_editor.core.splats.splats import Splats
-from splap_editor.io.formats.table import FORMATS
+from splap_editor.io.formats.table import FORMATS, format_named
 from splap_editor.io.sample_maker import write_sample
 from splap_editor.io.splat_files import read_splats, write_splats
 from tests.benchmark.peers import machine, peak_gib, report
@@ -63,24 +64,26 @@ def scene(n_splats: int) -> Splats:
     )
 
 
-def bench(name: str, scene_path: Path, folder: Path, n_repeats: int) -> None:
+def bench(name: str, scene_path: Path, folder: Path, n_repeats: int, peers: list[str]) -> None:
     """Write and read one format, in processes of their own."""
     row = FORMATS[name]
     held = folder / f"held{row.suffixes[0]}"
     if row.can_be_written:
-        _report(name, "write", [str(scene_path), str(held)], n_repeats)
+        _report(name, "write", [str(scene_path), str(held)], n_repeats, peers)
+    elif name == "sog-folder":
+        held = _unpacked(folder / f"held{FORMATS['sog'].suffixes[0]}", folder / "folder")
     elif not _made_by_gaussforge(name, scene_path, held):
         report(benchmark="formats", format=name, does="read", skipped="gaussforge, which makes the file, is missing")
         return
-    _report(name, "read", [str(held)], n_repeats)
+    _report(name, "read", [str(held)], n_repeats, peers)
 
 
-def _report(name: str, does: str, paths: list[str], n_repeats: int) -> None:
+def _report(name: str, does: str, paths: list[str], n_repeats: int, of_peers: list[str]) -> None:
     found = [_alone(does, *paths) for _ in range(n_repeats)]
     found.sort(key=lambda each: each["cpu"])
     chosen = found[len(found) // 2]
     peers = {}
-    for peer in ("gaussforge", "gsply"):
+    for peer in of_peers:
         held = [_alone(does, *paths, "--peer", peer, "--format", name) for _ in range(n_repeats)]
         held = sorted((each for each in held if each), key=lambda each: each["cpu"])
         if held:
@@ -94,6 +97,12 @@ def _alone(*words: str) -> dict:
     done = subprocess.run(command, cwd=REPOSITORY, check=True, capture_output=True, text=True)
     # Libraries write lines of their own before it.
     return json.loads(done.stdout.strip().splitlines()[-1])
+
+
+def _unpacked(archive: Path, folder: Path) -> Path:
+    with zipfile.ZipFile(archive) as held:
+        held.extractall(folder)
+    return folder / "meta.json"
 
 
 def _made_by_gaussforge(name: str, source: Path, target: Path) -> bool:
@@ -160,8 +169,8 @@ def vars_of(splats: Splats) -> dict:
 
 def _small(path: Path) -> Path:
     """A file of the same format with few splats, or the file itself where it cannot be written."""
-    row = next(row for row in FORMATS.values() if path.name == f"held{row.suffixes[0]}")
-    if not row.can_be_written:
+    row = format_named(path)
+    if row is None or not row.can_be_written:
         return path
     small = path.with_name(f"small{row.suffixes[0]}")
     if not small.exists():
@@ -208,6 +217,7 @@ def main() -> None:
     parser.add_argument("--formats", nargs="+", choices=FORMATS, default=list(FORMATS))
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--keep", type=Path, help="folder for the files, made if it is missing and left there")
+    parser.add_argument("--peers", nargs="*", default=["gaussforge", "gsply"], help="libraries to time beside")
     parser.add_argument("--one", nargs="+", help=argparse.SUPPRESS)
     parser.add_argument("--peer", default="", help=argparse.SUPPRESS)
     parser.add_argument("--format", default="", help=argparse.SUPPRESS)
@@ -224,7 +234,7 @@ def main() -> None:
         if not path.exists():
             write_sample(path, scene(options.splats))
         for each in options.formats:
-            bench(each, path, folder, options.repeats)
+            bench(each, path, folder, options.repeats, options.peers)
 
 
 if __name__ == "__main__":

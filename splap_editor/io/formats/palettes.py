@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.progress import Progress
+from splap_editor.core.progress import Progress, part_of
+from splap_editor.io.formats.bare_splats import row_blocks
 
 _BINS = 1 << 14
 _ROUNDS = 24
@@ -72,20 +73,42 @@ def palette(vectors: NDArray[np.float32], progress: Progress) -> tuple[NDArray[n
     # Group g holds places bounds[g] to bounds[g + 1] of the order, and is never empty.
     bounds = np.array([0, n])
     for level in range(n_levels):
+        told = part_of(progress, level / (n_levels + 1), (level + 1) / (n_levels + 1))
         sizes = np.diff(bounds)
         group = np.repeat(np.arange(len(sizes)), sizes)
-        ordered = vectors[order]
-        means = np.add.reduceat(ordered, bounds[:-1], axis=0, dtype=np.float64) / sizes[:, None]
-        spread = np.add.reduceat(np.square(ordered), bounds[:-1], axis=0, dtype=np.float64) / sizes[:, None] - means**2
-        widest = spread.argmax(axis=1)
-        keys = ordered[np.arange(n), widest[group]]
+        means, squares = _group_means(vectors, order, bounds, part_of(told, 0.0, 0.7), with_squares=True)
+        widest = (squares - means**2).argmax(axis=1)
+        keys = np.empty(n, np.float32)
+        for places in row_blocks(n, part_of(told, 0.7, 0.9)):
+            keys[places] = vectors[order[places], widest[group[places]]]
         order = order[np.lexsort((keys, group))]
         # Halves of equal size keep every group alive to the last level.
         middles = bounds[:-1] + sizes // 2
         bounds = np.sort(np.concatenate([bounds, middles]))
-        progress((level + 1) / (n_levels + 1))
+        told(1.0)
+    entries, _ = _group_means(vectors, order, bounds, part_of(progress, n_levels / (n_levels + 1), 1.0))
     sizes = np.diff(bounds)
-    entries = np.add.reduceat(vectors[order], bounds[:-1], axis=0, dtype=np.float64) / sizes[:, None]
     labels = np.empty(n, np.int64)
     labels[order] = np.repeat(np.arange(len(sizes)), sizes)
     return entries.astype(np.float32), labels
+
+
+def _group_means(
+    vectors: NDArray[np.float32],
+    order: NDArray[np.int64],
+    bounds: NDArray[np.int64],
+    progress: Progress,
+    *,
+    with_squares: bool = False,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(g, d) means of groups of vectors in an order, and of their squares if these are wanted, else zeros."""
+    sums = np.zeros((2, len(bounds) - 1, vectors.shape[1]))
+    for places in row_blocks(len(order), progress):
+        block = vectors[order[places]].astype(np.float64)
+        first, last = np.searchsorted(bounds, (places.start, places.stop - 1), side="right") - 1
+        starts = np.maximum(bounds[first : last + 1] - places.start, 0)
+        sums[0, first : last + 1] += np.add.reduceat(block, starts, axis=0)
+        if with_squares:
+            sums[1, first : last + 1] += np.add.reduceat(np.square(block, out=block), starts, axis=0)
+    sums /= np.diff(bounds)[:, None]
+    return sums[0], sums[1]
