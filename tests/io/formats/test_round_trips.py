@@ -14,9 +14,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from splap_editor.core.splats.splats import Splats
-from splap_editor.io.formats import bare_splats as bare_splats_module
 from splap_editor.io.formats.bare_splats import THIN_LOG_SCALE, alphas_of, bare_splats
-from splap_editor.io.formats.palettes import palette
 from splap_editor.io.formats.spz import _FLIPS
 from splap_editor.io.formats.table import FORMATS, format_to_write
 from splap_editor.io.ply import read_ply, write_ply
@@ -313,19 +311,3 @@ def test_edits_and_sessions_are_not_taken_for_splats(tmp_path):
     assert not are_splats(tmp_path / "edit.json") and not are_splats(tmp_path / "long.json")
     assert not are_splats(tmp_path / "nowhere.json") and not are_splats(tmp_path)
     assert are_splats(tmp_path / "folder") and are_splats(tmp_path / "folder" / "meta.json")
-
-
-def test_a_palette_is_that_of_its_groups_however_many_rows_are_taken_at_a_time(monkeypatch):
-    vectors = np.random.default_rng(1).normal(size=(900, 9)).astype(np.float32)
-    entries, labels = palette(vectors, lambda share: None)
-    monkeypatch.setattr(bare_splats_module, "BLOCK_ROWS", 37)
-    shares: list[float] = []
-    again, same = palette(vectors, shares.append)
-    np.testing.assert_array_equal(labels, same)
-    np.testing.assert_allclose(entries, again, atol=1e-7)
-    assert shares == sorted(shares) and len(shares) > 200
-    sizes = np.bincount(labels)
-    # Halved nine times.
-    assert len(entries) == 512 and sizes.min() >= 1 and sizes.max() <= 2
-    for entry, rows in enumerate([np.flatnonzero(labels == k) for k in range(20)]):
-        np.testing.assert_allclose(entries[entry], vectors[rows].mean(axis=0), atol=1e-6)
