@@ -196,6 +196,7 @@ def test_a_name_of_another_format_shows_its_losses_and_is_taken_when_it_comes_ag
     frames_dialog.export_to(tmp_path / "out.glb")
     assert ordered == [] and frames_dialog.choice.format.name == "gltf"
     wait_told(qtbot, frames_dialog.choice)
+    assert frames_dialog.accept_button.isEnabled() and frames_dialog.accept_button.isDefault()
     assert "Lost: Flat splats" in frames_dialog.choice.losses.text()
     frames_dialog.export_to(tmp_path / "out.glb")
     assert [order.path.name for order in ordered] == ["out.glb"]

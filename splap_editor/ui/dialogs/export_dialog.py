@@ -65,6 +65,8 @@ class ExportDialog(QDialog):
         self.note = PlainLabel(wordWrap=True)
         self.columns = ColumnsList(lacks)
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
+        # Focus goes to it while Export is off, and Return shall not mean it then.
+        buttons.button(QDialogButtonBox.StandardButton.Cancel).setAutoDefault(False)
         self.accept_button = buttons.addButton("Export", QDialogButtonBox.ButtonRole.AcceptRole)
         self.accept_button.setDefault(True)
         buttons.accepted.connect(self.accept)

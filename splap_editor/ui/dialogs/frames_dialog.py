@@ -91,6 +91,8 @@ class FramesDialog(QDialog):
         self.finished.connect(self.choice.give_up)
         self.note = PlainLabel(wordWrap=True)
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
+        # Focus goes to it while Export is off, and Return shall not mean it then.
+        buttons.button(QDialogButtonBox.StandardButton.Cancel).setAutoDefault(False)
         self.accept_button = buttons.addButton("Export…", QDialogButtonBox.ButtonRole.AcceptRole)
         self.accept_button.setDefault(True)
         buttons.accepted.connect(self._ask_for_path)
