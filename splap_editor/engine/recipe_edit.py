@@ -1,9 +1,12 @@
 """Edits as plain values, as a recipe holds them, and edits of a scene, each made from the other."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from splap_editor.core.graph.options import GraphOptions
 from splap_editor.core.handle_nodes import Region
+from splap_editor.core.progress import Progress, no_progress
 from splap_editor.core.removal import Finder as Find
 from splap_editor.core.removal import PickedRows
 from splap_editor.core.splats.splats import Splats
@@ -34,10 +37,11 @@ def recipe_of(edit: Edit, *, with_disabled: bool = False) -> plain.Edit:
     )
 
 
-def edit_of(recipe: plain.Edit, splats: Splats, find: Find | None = None) -> Edit:
+def edit_of(recipe: plain.Edit, splats: Splats, find: Find | None = None, progress: Progress = no_progress) -> Edit:
     """Make an edit of a recipe.
 
-    The centre of a handle given by rows alone is the mean of its splats. ``find`` is as in `removal_of`.
+    The centre of a handle given by rows alone is the mean of its splats. ``find`` is as in `removal_of`; ``progress``
+    is told the share of handles and pins that have their splats, and may cancel.
 
     Raises
     ------
@@ -45,12 +49,13 @@ def edit_of(recipe: plain.Edit, splats: Splats, find: Find | None = None) -> Edi
         A row is not in the file, nothing says which splats a handle or a pin is of, or there is no such quantity to
         remove splats by.
     """
+    regions = _regions(recipe, splats, progress)
     handles = tuple(
         Handle(
             number,
             spec.name,
             HANDLE_COLORS[(number - 1) % len(HANDLE_COLORS)],
-            _region(spec, splats, f"handle {spec.name!r}"),
+            next(regions),
             spec.pose,
             cage_radius=spec.cage_radius,
         )
@@ -59,7 +64,7 @@ def edit_of(recipe: plain.Edit, splats: Splats, find: Find | None = None) -> Edi
     return Edit(
         handles=handles,
         pins=tuple(
-            Pin(number, spec.name or _pin_name(number), _region(spec, splats, f"pin {number}"), spec.radius)
+            Pin(number, spec.name or _pin_name(number), next(regions), spec.radius)
             for number, spec in enumerate(recipe.pins, start=1)
         ),
         method=recipe.method,
@@ -127,6 +132,15 @@ def _place(region: Region) -> tuple[Vector, float | None, tuple[int, ...] | None
     if region.rows is None:
         return center, float(region.radius), None
     return center, None, tuple(np.asarray(region.rows).tolist())
+
+
+def _regions(recipe: plain.Edit, splats: Splats, progress: Progress) -> Iterator[Region]:
+    """Regions of all handles, and after them of all pins."""
+    named: list[tuple[plain.Handle | plain.Pin, str]] = [(spec, f"handle {spec.name!r}") for spec in recipe.handles]
+    named += [(pin, f"pin {number}") for number, pin in enumerate(recipe.pins, start=1)]
+    for done, (spec, name) in enumerate(named):
+        progress(done / len(named))
+        yield _region(spec, splats, name)
 
 
 def _region(spec: plain.Handle | plain.Pin, splats: Splats, name: str) -> Region:

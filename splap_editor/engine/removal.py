@@ -115,7 +115,7 @@ class Finder:
 
     def __init__(self, splats: Splats, *, stages: StageProgress = silent, alone: Guard = unguarded) -> None:
         self._splats = splats
-        self._stages = stages
+        self.stages = stages
         self._alone = alone
 
     def __call__(self, picked: Picked, removed: FileMask) -> FileMask:
@@ -123,9 +123,9 @@ class Finder:
         if isinstance(picked, PickedFloaters):
             from splap_editor.engine.floaters import floating_rows
 
-            return floating_rows(self._splats, removed, picked.strength, stages=self._stages)
+            return floating_rows(self._splats, removed, picked.strength, stages=self.stages)
         assert isinstance(picked, PickedRange)
-        values = rest_values(picked.quantity, self._splats, removed, stages=self._stages, alone=self._alone)
+        values = rest_values(picked.quantity, self._splats, removed, stages=self.stages, alone=self._alone)
         with np.errstate(invalid="ignore"):
             return (values >= picked.least) & (values <= picked.most)
 

@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from typing import Any, Literal, TypeVar, overload
@@ -14,11 +14,28 @@ from splap_editor.core.pose import LARGEST_COORDINATE
 Error = Callable[[str], ValueError]
 Group = TypeVar("Group")
 
+Look = Callable[[], None]
+"""Called now and then while a long document is read; raises `splap_editor.core.progress.Cancelled` to stop that."""
+
+_ITEMS = 1 << 12
+"""Numbers, or items of a list, from one look to the next."""
+
 _MOST_DIGITS = 400
 """Digits of a whole number: more than the largest float has."""
 
 _MOST_VALUES = 4_000_000
-"""Lists and texts in a document, an object counting for four: each takes some 60 bytes of memory."""
+"""Lists, texts, flags and nulls in a document, an object counting for four: each takes up to 60 bytes of memory."""
+
+
+_MARKS = {b"[": 1, b'"': 0.5, b"{": 4, b"null": 1, b"true": 1, b"false": 1}
+"""What gives values away that are counted, and for how many of them each stands."""
+
+_MOST_KEYS = 1 << 12
+"""Keys and other colons for each object."""
+
+
+def no_look() -> None:
+    """Never stop."""
 
 
 class JsonObject:
@@ -34,11 +51,15 @@ class JsonObject:
         The keys it may have; any other is refused with the nearest of them.
     error : callable (sentence) → exception
         Exception to raise.
+    look : Look
+        Called before each object and some items of long lists.
     """
 
-    def __init__(self, value: Any, path: str, keys: tuple[str, ...], error: Error) -> None:
+    def __init__(self, value: Any, path: str, keys: tuple[str, ...], error: Error, look: Look = no_look) -> None:
+        look()
         self._path = path
         self._error = error
+        self._look = look
         if not isinstance(value, dict):
             raise error(f"{path or 'the document'} must be an object in braces, got {shown(value)}")
         self._value = value
@@ -164,7 +185,7 @@ class JsonObject:
         if not isinstance(value, list | tuple) or not value:
             raise self.refuse(key, "a list of [x, y, z] points with at least one in it")
         found = []
-        for i, point in enumerate(value):
+        for i, point in self._looked_at(value):
             numbers = [_finite(part) for part in point] if isinstance(point, list | tuple) and len(point) == 3 else []
             fine = [number for number in numbers if number is not None and abs(number) <= LARGEST_COORDINATE]
             if len(fine) != 3:
@@ -180,21 +201,30 @@ class JsonObject:
         value = self._value.get(key)
         if not isinstance(value, list | tuple) or not value:
             raise self.refuse(key, "a list of row numbers with at least one in it")
-        for i, row in enumerate(value):
+        for i, row in self._looked_at(value):
             if not _is_integer(row) or not 0 <= row < 2**31:
                 raise self._error(f"{self.at(key)}[{i}] must be a row number, 0 or more, got {shown(row)}")
-        return tuple(int(row) for row in value)
+        return tuple(value)
 
     def row_pairs(self, key: str) -> tuple[tuple[int, int], ...]:
         """A list, perhaps empty, of pairs of different file rows."""
         value = self._value.get(key, ())
         if not isinstance(value, list | tuple):
             raise self.refuse(key, "a list of [row, row] pairs")
-        for i, pair in enumerate(value):
+        found = []
+        for i, pair in self._looked_at(value):
             fine = isinstance(pair, list | tuple) and len(pair) == 2 and all(_is_integer(row) for row in pair)
             if not fine or not all(0 <= row < 2**31 for row in pair) or pair[0] == pair[1]:
                 raise self._error(f"{self.at(key)}[{i}] must be a pair of different row numbers, got {shown(pair)}")
-        return tuple((int(a), int(b)) for a, b in value)
+            found.append((pair[0], pair[1]))
+        return tuple(found)
+
+    def _looked_at(self, items: Sequence[Any]) -> Iterator[tuple[int, Any]]:
+        """Items with their numbers; it may be stopped between them."""
+        for i, item in enumerate(items):
+            if i % _ITEMS == 0:
+                self._look()
+            yield i, item
 
     def objects(self, key: str, keys: tuple[str, ...]) -> "Iterator[JsonObject]":
         """Yield the objects of a list, which may be missing."""
@@ -202,7 +232,7 @@ class JsonObject:
         if not isinstance(value, list | tuple):
             raise self.refuse(key, "a list of objects")
         for i, item in enumerate(value):
-            yield JsonObject(item, f"{self.at(key)}[{i}]", keys, self._error)
+            yield JsonObject(item, f"{self.at(key)}[{i}]", keys, self._error, self._look)
 
     def one_or_more(self, key: str, keys: tuple[str, ...]) -> "Iterator[JsonObject]":
         """Yield an object, or those of a list, which may be missing."""
@@ -217,11 +247,14 @@ class JsonObject:
 
     def object(self, key: str, keys: tuple[str, ...]) -> "JsonObject":
         """An object; a missing one is empty."""
-        return JsonObject(self._value.get(key, {}), self.at(key), keys, self._error)
+        return JsonObject(self._value.get(key, {}), self.at(key), keys, self._error, self._look)
 
 
-def parsed_json(data: bytes, error: Error) -> Any:
+def parsed_json(data: bytes, error: Error, look: Look = no_look) -> Any:
     """Parse a JSON text, keys that stand twice refused.
+
+    The parser calls back for each number and object, so that it can be stopped and other threads have their turn:
+    alone it would hold Python's lock for seconds.
 
     Parameters
     ----------
@@ -229,9 +262,19 @@ def parsed_json(data: bytes, error: Error) -> Any:
         UTF-8, a byte-order mark allowed.
     error : callable (sentence) → exception
         Exception to raise.
+    look : Look
+        Called now and then.
     """
+    n_seen = 0
+
+    def seen_one() -> None:
+        nonlocal n_seen
+        n_seen += 1
+        if n_seen % _ITEMS == 0:
+            look()
 
     def distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        seen_one()
         found = dict(pairs)
         if len(found) < len(pairs):
             seen: set[str] = set()
@@ -242,14 +285,26 @@ def parsed_json(data: bytes, error: Error) -> Any:
         return found
 
     def whole(digits: str) -> int:
+        seen_one()
         if len(digits) > _MOST_DIGITS:
             raise error(f"it has a whole number of {len(digits):,} digits: {_MOST_DIGITS} are the most")
         return int(digits)
 
-    if data.count(b"[") + data.count(b'"') // 2 + 4 * data.count(b"{") > _MOST_VALUES:
-        raise error(f"it holds more than {_MOST_VALUES:,} lists, objects and texts")
+    def real(digits: str) -> float:
+        seen_one()
+        return float(digits)
+
+    n_values = 0
+    for mark, n_each in _MARKS.items():
+        look()
+        n_values += int(data.count(mark) * n_each)
+    # A long object is parsed in one go, and no document here has one.
+    if data.count(b":") > _MOST_KEYS * (1 + data.count(b"{")):
+        raise error(f"it holds objects of more than {_MOST_KEYS:,} keys")
+    if n_values > _MOST_VALUES:
+        raise error(f"it holds more than {_MOST_VALUES:,} lists, objects, texts, flags and nulls")
     try:
-        return json.loads(data.decode("utf-8-sig"), object_pairs_hook=distinct, parse_int=whole)
+        return json.loads(data.decode("utf-8-sig"), object_pairs_hook=distinct, parse_int=whole, parse_float=real)
     except json.JSONDecodeError as problem:
         raise error(f"it is not JSON: {problem.msg} in line {problem.lineno}, column {problem.colno}") from None
     except UnicodeDecodeError:

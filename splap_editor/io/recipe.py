@@ -12,9 +12,10 @@ from splap_editor.core.graph.options import GraphOptions, Joint, Separation
 from splap_editor.core.options import OptionSet, ShareOfSize, options_of
 from splap_editor.core.pose import LARGEST_COORDINATE, SCALES, Pose
 from splap_editor.core.presets import PRESETS, with_preset
+from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.reach_options import CageOptions, ReachOptions
 from splap_editor.io.atomic_file import atomic_file
-from splap_editor.io.json_object import JsonObject, json_lines, parsed_json, shown
+from splap_editor.io.json_object import JsonObject, Look, json_lines, no_look, parsed_json, shown
 from splap_editor.io.plain_edit import Edit, Handle, Pin, Vector
 from splap_editor.io.recipe_camera import camera_from_json, camera_to_json
 from splap_editor.io.recipe_removal import (
@@ -67,8 +68,11 @@ class RecipeError(ValueError):
     """A recipe that cannot be read; the message names the key and says what to put there."""
 
 
-def read_recipe(path: str | os.PathLike[str]) -> Edit:
+def read_recipe(path: str | os.PathLike[str], progress: Progress = no_progress) -> Edit:
     """Read a recipe.
+
+    ``progress`` is told the share of bytes read, and now and then while they
+    are parsed, which takes seconds for the largest; it may cancel.
 
     Raises
     ------
@@ -77,14 +81,20 @@ def read_recipe(path: str | os.PathLike[str]) -> Edit:
         sentence with the file, the key and what to put there.
     """
     path = Path(path)
+
+    def look() -> None:
+        progress(0.5)
+
     try:
-        data = regular_bytes(path)
+        data = regular_bytes(path, progress=part_of(progress, 0.0, 0.5))
     except OSError as error:
         raise RecipeError(f"{path} cannot be read: {error.strerror or error}. Check the path.") from error
     try:
-        return recipe_from_json(parsed_json(data, RecipeError))
+        recipe = recipe_from_json(parsed_json(data, RecipeError, look), look)
     except RecipeError as error:
         raise RecipeError(f"{path.name}: {error}.") from None
+    progress(1.0)
+    return recipe
 
 
 def write_recipe(path: str | os.PathLike[str], recipe: Edit) -> None:
@@ -108,7 +118,7 @@ def write_recipe(path: str | os.PathLike[str], recipe: Edit) -> None:
         raise RecipeError(f"{path} cannot be written: {error.strerror or error}. Choose another place.") from error
 
 
-def recipe_from_json(value: Any) -> Edit:
+def recipe_from_json(value: Any, look: Look = no_look) -> Edit:
     """Make a recipe of what ``json`` parsed.
 
     A missing key takes its default, or what the preset says, which is not kept by its name; rotations are normalised.
@@ -126,7 +136,7 @@ def recipe_from_json(value: Any) -> Edit:
             raise RecipeError(f'version is missing: put "version": {VERSION} into it')
         if isinstance(version, bool) or version != VERSION:
             raise RecipeError(f"version must be {VERSION}, got {shown(version)}: a newer one needs a newer editor")
-    recipe = JsonObject(value, "", recipe_keys(), RecipeError)
+    recipe = JsonObject(value, "", recipe_keys(), RecipeError, look)
     usual = OptionSet()
     if "preset" in recipe:
         usual = with_preset(usual, recipe.choice("preset", tuple(PRESETS), ""))

@@ -15,7 +15,7 @@ from splap_editor.core.index_spaces import FileMask
 from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.timeline import LAST_FRAME, Key, Timeline
 from splap_editor.io.atomic_file import atomic_file
-from splap_editor.io.json_object import JsonObject, json_lines, parsed_json, shown
+from splap_editor.io.json_object import JsonObject, Look, json_lines, no_look, parsed_json, shown
 from splap_editor.io.recipe import RecipeError, pose_from_json, pose_to_json, recipe_from_json, recipe_to_json
 from splap_editor.io.regular_file import open_regular, regular_bytes
 from splap_editor.io.session_specs import (
@@ -73,8 +73,8 @@ def content_hash(path: str | os.PathLike[str], progress: Progress = no_progress)
 def read_session_file(path: str | os.PathLike[str], progress: Progress = no_progress) -> SessionFile:
     """Read a session file; the PLY it names is not looked at.
 
-    ``progress`` is told the share of bytes read for each MiB, and once more
-    when all is parsed, which takes seconds for the largest.
+    ``progress`` is told the share of bytes read, and now and then while they
+    are parsed, which takes seconds for the largest; it may cancel.
 
     Raises
     ------
@@ -82,12 +82,16 @@ def read_session_file(path: str | os.PathLike[str], progress: Progress = no_prog
         If it cannot be read, is none, or was written by a newer editor.
     """
     path = Path(path)
+
+    def look() -> None:
+        progress(0.5)
+
     try:
         data = regular_bytes(path, progress=part_of(progress, 0.0, 0.5))
     except OSError as error:
         raise SessionFileError(f"{path} cannot be read: {error.strerror or error}. Check the path.") from error
     try:
-        session = session_from_json(parsed_json(data, SessionFileError))
+        session = session_from_json(parsed_json(data, SessionFileError, look), look)
     except SessionFileError as error:
         raise SessionFileError(f"{path.name}: {error}.") from None
     progress(1.0)
@@ -124,7 +128,7 @@ def relative_path(path: Path, folder: Path) -> str:
         return path.as_posix()
 
 
-def session_from_json(value: Any) -> SessionFile:
+def session_from_json(value: Any, look: Look = no_look) -> SessionFile:
     """Make a session of what ``json`` parsed.
 
     Raises
@@ -139,10 +143,10 @@ def session_from_json(value: Any) -> SessionFile:
         raise SessionFileError(f"version must be {VERSION}, got {shown(version)}")
     if version > VERSION:
         raise SessionFileError(f"it was saved by a newer SpLap Editor (version {version}, this one reads {VERSION})")
-    session = JsonObject(value, "", _KEYS, SessionFileError)
+    session = JsonObject(value, "", _KEYS, SessionFileError, look)
     ply = _ply(session.object("ply", ("path", "hash", "n_splats", "layout")))
     try:
-        recipe = recipe_from_json(value.get("recipe", {}))
+        recipe = recipe_from_json(value.get("recipe", {}), look)
     except RecipeError as error:
         raise SessionFileError(f"recipe: {error}") from None
     handles = tuple(_handle(h) for h in session.objects("handles", ("id", "color", "enabled")))
@@ -233,8 +237,10 @@ def _pin_json(pin: PinSettings) -> dict[str, Any]:
 
 
 def _chosen(session: JsonObject, key: str, known: list[int]) -> tuple[int, ...]:
-    """Ids that are chosen, as far as there are such handles or pins."""
-    return tuple(i for i in session.rows(key) if i in known) if key in session else ()
+    """Ids that are chosen, each once, as far as there are such handles or pins."""
+    asked = dict.fromkeys(session.rows(key)) if key in session else {}
+    there = set(known)
+    return tuple(i for i in asked if i in there)
 
 
 def _timeline(timeline: JsonObject) -> Timeline:

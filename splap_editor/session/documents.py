@@ -172,7 +172,7 @@ class Documents:
             arrival, source = found
 
             def restore(scene: Scene, find: Finder) -> None:
-                restore_scene(scene, arrival.session, find)
+                restore_scene(scene, arrival.session, find, find.stages("restoring the edit"))
                 arrival.scene = scene
 
             self._arrival = arrival

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from splap_editor.core.index_spaces import FileMask
+from splap_editor.core.progress import Progress, no_progress
 from splap_editor.core.removal import Finder as Find
 from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.edit import Edit
@@ -96,7 +97,9 @@ def session_file_of(state: SavedState, folder: Path | None, content_hash: str) -
     )
 
 
-def session_edit(session: SessionFile, splats: Splats, find: Find | None = None) -> Edit:
+def session_edit(
+    session: SessionFile, splats: Splats, find: Find | None = None, progress: Progress = no_progress
+) -> Edit:
     """Make the edit of a session file.
 
     Parameters
@@ -106,13 +109,15 @@ def session_edit(session: SessionFile, splats: Splats, find: Find | None = None)
         Of the PLY it belongs to.
     find : callable, optional
         As in `splap_editor.engine.removal.removal_of`.
+    progress : Progress
+        As of `splap_editor.engine.recipe_edit.edit_of`.
 
     Raises
     ------
     RecipeError
         A row is not in the PLY.
     """
-    edit = edit_of(session.recipe, splats, find)
+    edit = edit_of(session.recipe, splats, find, progress)
     handles = tuple(
         replace(handle, handle_id=settings.handle_id, color=settings.color, enabled=settings.enabled)
         for handle, settings in zip(edit.handles, session.handles, strict=True)
@@ -128,10 +133,12 @@ def session_edit(session: SessionFile, splats: Splats, find: Find | None = None)
     return replace(edit, handles=handles, pins=pins, timeline=timeline)
 
 
-def restore_scene(scene: Scene, session: SessionFile, find: Find | None = None) -> None:
+def restore_scene(
+    scene: Scene, session: SessionFile, find: Find | None = None, progress: Progress = no_progress
+) -> None:
     """Put what a session file holds into a scene just read, before anyone follows it.
 
-    ``find`` is as in `splap_editor.engine.removal.removal_of`.
+    ``find`` and ``progress`` are as of `session_edit`.
 
     Raises
     ------
@@ -139,7 +146,7 @@ def restore_scene(scene: Scene, session: SessionFile, find: Find | None = None) 
         The session belongs to another PLY: it names rows that this one does not have.
     """
     try:
-        scene.edit = session_edit(session, scene.splats, find)
+        scene.edit = session_edit(session, scene.splats, find, progress)
     except ValueError as error:
         raise SessionFileError(f"the session does not fit {scene.file.path.name}: {error}") from None
     known = {handle.handle_id for handle in scene.edit.handles}

@@ -150,7 +150,7 @@ class Session:
 
         title = f"Opening {path.name}"
         self._edits.ask(
-            lambda job: read_edit(path, scene, told_finder(job, scene.splats)),
+            lambda job: read_edit(path, scene, told_finder(job, scene.splats), job.progress("reading the edit")),
             taken,
             failed=lambda error: self.failed.emit(title, error),
             title=title,
