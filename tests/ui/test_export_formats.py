@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QFileDialog, QWidget
 from shiboken6 import isValid
 
 from splap_editor.app import Mailbox
@@ -53,7 +54,9 @@ def ordered():
 
 @pytest.fixture
 def frames_dialog(qtbot, flat_file, worker, ordered):
-    made = FramesDialog(None, flat_file, Timeline(), (80, 60), ordered.append, worker)
+    host = QWidget()
+    qtbot.addWidget(host)
+    made = FramesDialog(host, flat_file, Timeline(), (80, 60), ordered.append, worker)
     made.show()
     yield made
     if isValid(made):
@@ -185,6 +188,18 @@ def test_frames_of_a_format_that_loses_something_say_so_before_a_name_is_asked_f
     choose(frames_dialog.choice, "spz")
     wait_told(qtbot, frames_dialog.choice)
     assert "Lost: Flat splats" in frames_dialog.choice.losses.text() and frames_dialog.choice.losses.isVisible()
+
+
+def test_the_name_asked_for_has_the_ending_of_the_format_chosen(frames_dialog, dialog, qtbot, tmp_path):
+    frames_dialog.kind.setCurrentIndex(frames_dialog.kind.findData("splats"))
+    for made, button in ((frames_dialog, frames_dialog.accept_button), (dialog, dialog.browse_button)):
+        choose(made.choice, "spz")
+        wait_told(qtbot, made.choice)
+        button.click()
+        asked = next(w for w in QApplication.topLevelWidgets() if isinstance(w, QFileDialog) and w.isVisible())
+        assert asked.selectedFiles()[0].endswith(".spz")
+        asked.reject()
+        qtbot.waitUntil(lambda asked=asked: not isValid(asked) or not asked.isVisible(), timeout=WAIT_MS)
 
 
 def test_a_name_of_another_format_shows_its_losses_and_is_taken_when_it_comes_again(

@@ -51,7 +51,7 @@ class ExportDialog(QDialog):
         self._source, self._suggested = scene.file.path, suggested
         self.path_field = QLineEdit(str(suggested))
         self.path_field.setMinimumWidth(420)
-        browse = QPushButton("Browse…")
+        self.browse_button = browse = QPushButton("Browse…")
         browse.setAutoDefault(False)
         browse.clicked.connect(self._on_browse_clicked)
         line = QHBoxLayout()
@@ -153,5 +153,7 @@ class ExportDialog(QDialog):
         dialog.setOption(QFileDialog.Option.DontConfirmOverwrite)
         dialog.setNameFilter(f"Splats ({name_filter(to_write=True)})")
         dialog.setDefaultSuffix("ply")
+        # A filter gives the name its own first ending.
+        dialog.selectFile(str(self.path))
         dialog.fileSelected.connect(self.path_field.setText)
         dialog.open()

@@ -164,6 +164,8 @@ class FramesDialog(QDialog):
         dialog.setOption(QFileDialog.Option.DontConfirmOverwrite)
         dialog.setNameFilter(_SPLATS if of_splats else _PICTURES)
         dialog.setDefaultSuffix(suffix[1:])
+        # A filter gives the name its own first ending.
+        dialog.selectFile(str(suggested))
         dialog.fileSelected.connect(lambda name: self.export_to(Path(name)))
         dialog.open()
 
