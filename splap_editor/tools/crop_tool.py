@@ -118,7 +118,7 @@ class CropMover:
 
 
 class CropTool(Tool):
-    """The shape shows when the pointer enters; Return removes what is tinted in one step, Escape leaves it all."""
+    """The shape shows once the tool is in use; Return removes what is tinted in one step, Escape leaves it all."""
 
     name = "crop"
     option_kinds: ClassVar[tuple[type, ...]] = (CropOptions, CropNumbers)
@@ -188,6 +188,11 @@ class CropTool(Tool):
         self._is_dismissed = False
 
     # Gestures -----------------------------------------------------------------------------------------------------
+
+    def taken_up(self) -> None:
+        """Show the shape, wherever the pointer is."""
+        if self.context.session.scene is not None:
+            self.begin()
 
     def hover(self, event: PointerEvent) -> bool:
         """Light up the handle under the pointer."""

@@ -39,9 +39,11 @@ class FloaterOptions:
 
 
 class FloatersTool(Tool):
-    """Looks for floaters when the pointer enters; the strength changes what is tinted at once."""
+    """Looks for floaters once it is in use; the strength changes what is tinted at once."""
 
     name = "floaters"
+    # A handle's gizmo would take the clicks that look at a group.
+    mutes_gizmo = True
     option_kinds: ClassVar[tuple[type, ...]] = (FloaterOptions,)
 
     def __init__(self, context: ToolContext) -> None:
@@ -94,8 +96,13 @@ class FloatersTool(Tool):
         super().cancel()
         self.drop()
 
+    def taken_up(self) -> None:
+        """Begin to look, wherever the pointer is."""
+        if self.context.session.scene is not None:
+            self.ask()
+
     def hover(self, event: PointerEvent) -> bool:
-        """Begin to look."""
+        """Look among what has come since."""
         if not self._is_asked:
             self.ask()
         return False

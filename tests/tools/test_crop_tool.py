@@ -12,7 +12,6 @@ def shown(hand, kind="box"):
     hand.tools.choose("crop")
     tool = hand.tools.chosen
     hand.context.held(CropOptions).set(CropOptions(kind))
-    hand.hover((5, 5))
     assert tool.shape is not None
     return tool
 

@@ -16,7 +16,6 @@ def looked_for(hand, strength):
     hand.context.held(FloaterOptions).set(FloaterOptions(strength))
     hand.tools.choose("floaters")
     tool = hand.tools.chosen
-    hand.hover((5, 5))
     hand.main.run_until(lambda: tool.found is not None)
     return tool
 
@@ -102,7 +101,6 @@ def test_another_tool_stops_the_looking(hand, monkeypatch):
     monkeypatch.setattr("splap_editor.tools.floaters_tool.floater_search", slow)
     hand.tools.choose("floaters")
     tool = hand.tools.chosen
-    hand.hover((5, 5))
     assert begun.wait(60.0)
     hand.tools.choose("handle")
     go_on.set()
