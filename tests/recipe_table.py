@@ -10,6 +10,7 @@ from splap_editor.core.presets import PRESETS
 from splap_editor.core.reach_options import CageOptions
 from splap_editor.io.recipe import recipe_groups
 from splap_editor.io.recipe_removal import PICKED_KINDS
+from splap_editor.io.recipe_schema import FREES
 from tests.keys_table import README, with_block
 
 START, END = "<!-- recipe: python -m tests.recipe_table -->\n", "<!-- end of recipe -->\n"
@@ -24,7 +25,8 @@ def recipe_table() -> str:
     cage = " ".join(_told(known) for known in options_of(CageOptions).values())
     place = "`name`, `center` and `radius`, or file `rows`"
     pose = "`translate`, `rotate` (w, x, y, z), `scale` about the center"
-    rows += [("handles", f"{place}; {pose}; `cage_radius`: {cage}"), ("pins", f"{place}: they stay")]
+    frees = f"`frees`: {FREES} True by default."
+    rows += [("handles", f"{place}; {pose}; `cage_radius`: {cage} {frees}"), ("pins", f"{place}: they stay")]
     for key, group in recipe_groups():
         only = [row.method for row in DEFORMERS if row.options is group]
         said = f" (`{only[0]}`)" if only else ""

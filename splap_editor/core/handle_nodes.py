@@ -40,6 +40,7 @@ def handle_nodes(
     *,
     free_radius: float | None = None,
     cage_radii: NDArray[np.float64] | Sequence[float] | None = None,
+    frees: NDArray[np.bool_] | Sequence[bool] | None = None,
 ) -> Handles:
     """Find the nodes that each handle and pin holds.
 
@@ -56,6 +57,8 @@ def handle_nodes(
         that no pin holds free. Without handles nothing is added.
     cage_radii : (H,) float, optional
         Reach of each handle's bounded biharmonic weight in world units; inf, the default, for the whole object.
+    frees : (H,) bool, optional
+        Which handles the free radius is measured from, by default all; where none is, all are.
 
     Returns
     -------
@@ -66,7 +69,7 @@ def handle_nodes(
     ------
     ValueError
         If the scene has no active splat, a centre is not three finite numbers, a radius is negative, a row is outside
-        the file, or ``cage_radii`` has another length than ``handles``.
+        the file, or ``cage_radii`` or ``frees`` has another length than ``handles``.
     """
     if ellipses.n_nodes == 0:
         raise ValueError("no splat of this scene is active, so there is nothing to hold")
@@ -75,6 +78,9 @@ def handle_nodes(
     cages = np.full(len(handles), np.inf) if cage_radii is None else np.asarray(cage_radii, np.float64)
     if cages.shape != (len(handles),):
         raise ValueError(f"cage_radii must have shape ({len(handles)},), got {cages.shape}")
+    from_ = np.ones(len(handles), bool) if frees is None else np.asarray(frees, bool)
+    if from_.shape != (len(handles),):
+        raise ValueError(f"frees must have shape ({len(handles)},), got {from_.shape}")
     tree = cKDTree(ellipses.centers)
     labels = np.full(ellipses.n_nodes, FREE, np.int32)
     for pin in pins:
@@ -82,7 +88,8 @@ def handle_nodes(
     for label in range(len(handles) - 1, -1, -1):
         labels[region_nodes(handles[label], ellipses, tree)] = label
     if free_radius is not None and (labels >= 0).any():
-        moved = cKDTree(ellipses.centers[labels >= 0])
+        is_moved = np.isin(labels, np.flatnonzero(from_))
+        moved = cKDTree(ellipses.centers[is_moved if is_moved.any() else labels >= 0])
         others = np.flatnonzero(labels == FREE)
         distances, _ = moved.query(ellipses.centers[others], distance_upper_bound=np.nextafter(free_radius, np.inf))
         labels[others[~np.isfinite(distances)]] = PIN

@@ -281,6 +281,7 @@ def handles_of(surface: Surface, edit: Edit) -> Handles:
         [pin.region for pin in edit.pins],
         free_radius=free,
         cage_radii=[np.inf if radius is None else radius for radius in cages],
+        frees=[handle.frees for handle in edit.active_handles],
     )
 
 

@@ -42,6 +42,8 @@ class Handle:
         A disabled handle neither moves nor holds anything and is not in the recipe.
     cage_radius : float, ShareOfSize or None
         Reach of the handle's weight, see `CageOptions`.
+    frees : bool
+        Whether the free radius is measured from it too; a pin put where something has moved holds it and frees nothing.
     """
 
     handle_id: int
@@ -51,6 +53,7 @@ class Handle:
     pose: Pose = field(default_factory=Pose)
     enabled: bool = True
     cage_radius: Length = CageOptions.cage_radius
+    frees: bool = True
 
     @property
     def transform(self) -> NDArray[np.float64]:
@@ -148,6 +151,13 @@ class Edit:
         is_at_rest = all(handle.pose.is_identity for handle in self.active_handles)
         return is_at_rest and self.removed is None and self.place.is_identity
 
+    @property
+    def has_work(self) -> bool:
+        """Whether there is anything a person made: handles and pins are work before anything is moved by them."""
+        graph = self.graph
+        mends = graph.cut or graph.add or graph.separate or graph.join
+        return bool(self.handles or self.pins or mends) or not (self.timeline.is_empty and self.is_identity)
+
     def handle(self, handle_id: int) -> Handle:
         """Find a handle by its id; KeyError when there is none."""
         for handle in self.handles:
@@ -215,7 +225,7 @@ def binds_like(a: Edit, b: Edit) -> bool:
         len(left) == len(right)
         and all(x.region is y.region for x, y in zip(a.pins, b.pins, strict=True))
         and all(
-            x.region is y.region and (not row.has_weights or x.cage_radius == y.cage_radius)
+            x.region is y.region and x.frees == y.frees and (not row.has_weights or x.cage_radius == y.cage_radius)
             for x, y in zip(left, right, strict=True)
         )
     )

@@ -58,6 +58,7 @@ def edit_of(recipe: plain.Edit, splats: Splats, find: Find | None = None, progre
             next(regions),
             spec.pose,
             cage_radius=spec.cage_radius,
+            frees=spec.frees,
         )
         for number, spec in enumerate(recipe.handles, start=1)
     )
@@ -124,6 +125,7 @@ def _handle_spec(handle: Handle) -> plain.Handle:
         handle.pose.rotate,
         handle.pose.scale,
         handle.cage_radius,
+        handle.frees,
     )
 
 

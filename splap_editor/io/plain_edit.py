@@ -59,6 +59,8 @@ class Handle:
         Uniform, or along the world axes before the rotation; greater than 0.
     cage_radius : float, ShareOfSize or None
         Reach of the handle's weight, see `CageOptions`.
+    frees : bool
+        Whether the free radius is measured from it too; False for one that only holds splats where they have gone.
     """
 
     name: str = ""
@@ -69,6 +71,7 @@ class Handle:
     rotate: Quaternion = (1.0, 0.0, 0.0, 0.0)
     scale: float | Vector = 1.0
     cage_radius: Length = CageOptions.cage_radius
+    frees: bool = True
 
     @property
     def pose(self) -> Pose:

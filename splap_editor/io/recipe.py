@@ -46,7 +46,7 @@ VERSION = 1
 
 REGION_KEYS = ("center", "radius", "rows")
 PIN_KEYS = (*REGION_KEYS, "name")
-HANDLE_KEYS = ("name", *REGION_KEYS, "translate", "rotate", "scale", *options_of(CageOptions))
+HANDLE_KEYS = ("name", *REGION_KEYS, "translate", "rotate", "scale", *options_of(CageOptions), "frees")
 
 
 def recipe_groups() -> tuple[tuple[str, type], ...]:
@@ -178,6 +178,7 @@ def _handle(handle: JsonObject, index: int) -> Handle:
         rotate=pose.rotate,
         scale=pose.scale,
         cage_radius=handle.options(CageOptions).cage_radius,
+        frees=handle.flag("frees", Handle.frees),
     )
 
 

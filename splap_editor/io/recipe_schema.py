@@ -24,6 +24,9 @@ _ROWS_OF = "Content hash of the file that rows are meant of, where its format ha
 _POSITIVE = {"type": "number", "exclusiveMinimum": 0}
 
 
+FREES = "Whether the free radius is measured from it too; false: it holds splats where they have gone, as a pin does."
+
+
 def recipe_schema() -> dict[str, Any]:
     """Make the schema, draft 2020-12.
 
@@ -83,6 +86,7 @@ def _handle_properties() -> dict[str, Any]:
         },
         "scale": {"anyOf": scales, "description": "About the center: uniform, or along the world axes."},
         **{name: _option(known) for name, known in options_of(CageOptions).items()},
+        "frees": {"type": "boolean", "default": True, "description": FREES},
     }
 
 

@@ -131,13 +131,14 @@ class Documents:
 
     @property
     def would_lose(self) -> bool:
-        """Whether leaving the scene now would lose work: an edit neither saved nor exported, or keys not saved.
+        """Whether leaving the scene now would lose work: handles, pins, keys or a changed object that no session has.
 
-        Handles and pins are work before anything is moved by them.
+        An export keeps the shape and not what it was made by: it is no reason to let go of that without a word.
         """
         if not self.is_dirty:
             return False
-        return self._session.has_unexported_work or not self._session.shown_scene.edit.timeline.is_empty
+        held = [self._session.shown_scene.edit] + ([self._kept.edit] if self._kept is not None else [])
+        return any(edit.has_work for edit in held)
 
     def file_of(self, state: SavedState, folder: Path | None) -> SessionFile:
         """Session file of a state, with the hash of the PLY as far as it is known."""

@@ -101,11 +101,6 @@ class Session:
         return self.scene is not None and self._ledger.has_unexported_edit
 
     @property
-    def has_unexported_work(self) -> bool:
-        """Whether there are handles or pins that no export had, moved or not, or such an edit."""
-        return self.scene is not None and self._ledger.has_unexported_work
-
-    @property
     def n_threads(self) -> int:
         """Threads that weights of handles may be solved on."""
         return self._ledger.n_threads

@@ -107,12 +107,6 @@ class Ledger:
         return not self._is_exported and not (self.shown_scene.edit.is_identity and exported.is_identity)
 
     @property
-    def has_unexported_work(self) -> bool:
-        """Whether there are handles or pins that no export had, moved or not, or such an edit."""
-        edit = self.shown_scene.edit
-        return self.has_unexported_edit or (not self._is_exported and bool(edit.handles or edit.pins))
-
-    @property
     def _is_exported(self) -> bool:
         return writes_like(self.shown_scene.edit, self.exported or Edit())
 

@@ -1,6 +1,7 @@
 """What a person changes in a scene, each as one step that can be undone."""
 
 from dataclasses import replace
+from itertools import count
 
 import numpy as np
 
@@ -9,7 +10,7 @@ from splap_editor.core.index_spaces import FileMask
 from splap_editor.core.place import Place, stood_up
 from splap_editor.core.pose import Pose
 from splap_editor.core.removal import Vector
-from splap_editor.engine.edit import HANDLE_COLORS, Edit, Handle, Pin
+from splap_editor.engine.edit import HANDLE_COLORS, PIN_COLOR, Edit, Handle, Pin
 from splap_editor.engine.keyframes import auto_keyed_edit
 from splap_editor.engine.removal import Removal
 from splap_editor.session.commands import ChangeEdit, ChangeMask, ChangeTogether, StandUp
@@ -101,10 +102,25 @@ class UndoSteps:
         scene.set_active_handles((handle_id,))
         return handle
 
+    def add_held(self, region: Region, pose: Pose) -> Handle:
+        """Hold splats where they have been moved to: a handle that keeps their pose and frees nothing around it."""
+        scene = self._ledger.shown_scene
+        handle_id = scene.edit.next_handle_id()
+        held = Handle(handle_id, _pin_name(scene.edit, 1), PIN_COLOR, region, pose, frees=False)
+        self._ledger.is_halted = False
+        self.change_edit(scene.edit.with_handle(held), "Place pin")
+        return held
+
     def add_pin(self, region: Region, *, reach: float | None = None) -> Pin:
         """Hold splats where they are; ``reach``: the region is a disc on the surface of this radius."""
         edit = self._ledger.shown_scene.edit
         pin_id = edit.next_pin_id()
-        pin = Pin(pin_id, f"Pin {pin_id}", region, reach)
+        pin = Pin(pin_id, _pin_name(edit, pin_id), region, reach)
         self.change_edit(edit.with_pin(pin), "Place pin")
         return pin
+
+
+def _pin_name(edit: Edit, number: int) -> str:
+    """First name from a number on that no pin has, nor a handle that holds like one."""
+    names = {*(handle.name for handle in edit.handles), *(pin.name for pin in edit.pins)}
+    return next(name for name in (f"Pin {n}" for n in count(number)) if name not in names)

@@ -96,9 +96,15 @@ class MeasureTool(Tool):
         return EndStroke(self, near) if apart[near] <= GRAB_PX * self.context.viewport.gizmo.scale else False
 
     def enter(self, event: KeyEvent) -> bool:
-        """Take one more character of the true length, or one less."""
-        if len(self.rows) < 2 or (event.key == "Backspace" and not self._typed):
+        """Take one more character of the true length, or one less.
+
+        Never left to the shortcuts: a digit too early would change the display, a Backspace too many delete handles.
+        """
+        if self.context.session.scene is None:
             return False
+        if len(self.rows) < 2:
+            self.context.hud.show(text="Click both ends, then type the true length")
+            return True
         self._typed = self._typed[:-1] if event.key == "Backspace" else self._typed + event.text
         self._show()
         return True
@@ -129,6 +135,7 @@ class MeasureTool(Tool):
             self._show()
         else:
             self.forget()
+            self.context.hud.show()
         return had
 
     def cancel(self) -> None:

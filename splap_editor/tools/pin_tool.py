@@ -27,4 +27,4 @@ class PinTool(DiscTool):
         if pose.is_identity:
             self.context.session.steps.add_pin(region, reach=self.radius_world)
         else:
-            self.context.session.steps.add_handle(region, pose=pose, name="Pin")
+            self.context.session.steps.add_held(region, pose)

@@ -5,13 +5,14 @@ from collections.abc import Iterable, Iterator
 from splap_editor.tools.bindings import Binding, capitalised
 from splap_editor.tools.tool_table import bindings_by_group
 from splap_editor.ui.actions.action_spec import ActionSpec
+from splap_editor.ui.panels.handle_rows import NameField
 from splap_editor.ui.timeline.ruler import TimelineRuler
 from splap_editor.ui.viewport_widget import ViewportWidget
 from splap_editor.ui.widgets.histogram import Histogram
 from splap_editor.ui.widgets.number_field import NumberField, ScrubLabel
 from splap_editor.ui.widgets.widget_gestures import Rows
 
-WIDGETS = (ViewportWidget, Histogram, TimelineRuler, ScrubLabel, NumberField)
+WIDGETS = (ViewportWidget, NameField, Histogram, TimelineRuler, ScrubLabel, NumberField)
 """Kinds of widgets with gestures of their own, beside those of the tools."""
 
 

@@ -1,8 +1,9 @@
 """The window: viewport in the middle, tools at the left, panels at the right, one line of state below."""
 
-from PySide6.QtCore import QEvent, QPoint, QSettings, QSize, Qt, Signal
+from PySide6.QtCore import QEvent, QPoint, QRect, QSettings, QSize, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QKeyEvent
 from PySide6.QtWidgets import (
+    QApplication,
     QDockWidget,
     QMainWindow,
     QMenu,
@@ -53,7 +54,7 @@ from splap_editor.ui.panels.section import Section, bring_into_view
 from splap_editor.ui.preferences import PreferenceStore
 from splap_editor.ui.theme import show_more_button
 from splap_editor.ui.timeline.strip import TimelineStrip
-from splap_editor.ui.viewport_widget import ViewportWidget
+from splap_editor.ui.viewport_widget import ViewportWidget, is_typed_into
 from splap_editor.ui.widgets.job_bar import JobBar
 from splap_editor.ui.widgets.overlay import Overlay
 from splap_editor.ui.widgets.recovery_bar import RecoveryBar
@@ -83,6 +84,9 @@ CONTEXT_MENU = (
     "view.home",
 )
 LAYOUT_VERSION = 1
+FRAME = QSize(16, 48)
+"""Room for the frame and title that a window manager gives a window."""
+
 UPS = {(0.0, 0.0, 1.0): "view.up_z", (0.0, 1.0, 0.0): "view.up_y", (0.0, -1.0, 0.0): "view.down_y"}
 
 GUESSED_UP = (0.0, -1.0, 0.0)
@@ -398,17 +402,25 @@ class MainWindow(FileDrop, QMainWindow):
 
     def event(self, event: QEvent) -> bool:
         """Let tools have a key that no text field wants, wherever the focus is."""
-        is_override = event.type() == QEvent.Type.ShortcutOverride and not self.viewport.hasFocus()
-        if is_override and isinstance(event, QKeyEvent) and self.viewport.take_before_shortcuts(event):
+        is_override = event.type() == QEvent.Type.ShortcutOverride
+        is_free = not (self.viewport.hasFocus() or is_typed_into(QApplication.focusWidget()))
+        if is_override and is_free and isinstance(event, QKeyEvent) and self.viewport.take_before_shortcuts(event):
             return True
         return super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Take a key that the focused widget did not want; Return and Escape bring the keyboard back to the picture."""
-        if not self.viewport.hasFocus():
+        """Take a key that the focused widget did not want; Return and Escape bring the keyboard back to the picture.
+
+        Where something was typed they do no more than that: what the tool does on Return is the next one's.
+        """
+        if self.viewport.hasFocus():
+            return
+        is_typed = is_typed_into(QApplication.focusWidget())
+        is_leaving = event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Escape)
+        if not (is_leaving and is_typed):
             self.viewport.keyPressEvent(event)
-            if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Escape):
-                self.viewport.setFocus()
+        if is_leaving:
+            self.viewport.setFocus()
 
     def keyReleaseEvent(self, event: QKeyEvent) -> None:
         """Let go of a key that the viewport holds."""
@@ -453,18 +465,25 @@ class MainWindow(FileDrop, QMainWindow):
         geometry, layout = settings.value("window/geometry"), settings.value("window/layout")
         if geometry is None or not self.restoreGeometry(geometry):
             self.resize(1440, 900)
-        # The geometry may have been kept on a larger screen, or at a smaller scale.
-        room = self.screen().availableGeometry()
-        if not self.isFullScreen():
-            self.setMinimumSize(self.minimumSize().boundedTo(room.size()))
-            self.resize(self.size().boundedTo(room.size()))
-            spare = room.size() - self.size()
-            low = room.topLeft()
-            self.move(
-                min(max(self.x(), low.x()), low.x() + spare.width()),
-                min(max(self.y(), low.y()), low.y() + spare.height()),
-            )
+        self._fit_screen()
         if layout is not None:
             self.restoreState(layout, LAYOUT_VERSION)
         self.actions_.check("view.panels", not self.dock.isHidden())
         self.actions_.check("view.turntable", self.view.viewport.camera.is_turntable)
+
+    def _fit_screen(self) -> None:
+        """Fill the screen where there is no room for the window and its frame, which is not known before it is shown.
+
+        The geometry may have been kept on a larger screen, or at a smaller scale. One that fits is left alone: moved
+        before there is a frame, a window creeps by the frame's width at each start.
+        """
+        room = self.screen().availableGeometry()
+        most = room.size() - FRAME
+        self.setMinimumSize(self.minimumSize().boundedTo(most))
+        if self.isMaximized() or self.isFullScreen():
+            return
+        if self.size() != self.size().boundedTo(most):
+            self.setGeometry(QRect(room.topLeft() + QPoint(FRAME.width(), FRAME.height()), self.size().boundedTo(most)))
+            self.setWindowState(self.windowState() | Qt.WindowState.WindowMaximized)
+        elif not room.contains(self.geometry()):
+            self.move(room.center() - self.rect().center())

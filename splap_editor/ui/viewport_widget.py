@@ -160,7 +160,7 @@ class ViewportWidget(QtInteractor):
 
     def enterEvent(self, event: QEvent) -> None:
         """Take the keyboard, unless something is being typed."""
-        if not isinstance(QApplication.focusWidget(), (QLineEdit, QAbstractSpinBox)):
+        if not is_typed_into(QApplication.focusWidget()):
             self.setFocus(Qt.FocusReason.MouseFocusReason)
 
     def leaveEvent(self, event: QEvent) -> None:
@@ -279,6 +279,11 @@ class ViewportWidget(QtInteractor):
                 pressed=pressed,
             ),
         )
+
+
+def is_typed_into(widget: QWidget | None) -> bool:
+    """Whether a widget, if there is one, is a field that takes what is typed."""
+    return isinstance(widget, (QLineEdit, QAbstractSpinBox))
 
 
 def ask_of_qt() -> None:

@@ -238,7 +238,8 @@ class SceneView:
         if scene is not None and free is not None:
             radius = world_length(free, scene.ellipses.scene_scale)
             direction = self.viewport.projection.direction
-            handles = [handle for handle in scene.edit.active_handles if handle.handle_id in scene.active_handles]
+            chosen = scene.active_handles
+            handles = [each for each in scene.edit.active_handles if each.frees and each.handle_id in chosen]
             loops = [circle(handle.region.center, direction, radius) for handle in handles]
             rings.show("free", loops, FREE_RING_COLOR, opacity=0.8)
         self.viewport.request_render()

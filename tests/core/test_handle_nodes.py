@@ -70,6 +70,16 @@ def test_far_splats_are_pinned_by_their_distance_from_every_handled_splat():
     assert handles.labels.tolist() == [0, 0, 0, -1, 1]
 
 
+def test_what_only_holds_frees_nothing_about_it():
+    handles = handle_nodes(LINE, [_at(2.0, 1.0), _at(9.0)], free_radius=2.0, frees=[True, False])
+    assert handles.indices.tolist() == [1, 2, 3, 6, 7, 8, 9, 10]
+    assert handles.labels.tolist() == [0, 0, 0, -1, -1, -1, 1, -1]
+    alone = handle_nodes(LINE, [_at(9.0)], free_radius=2.0, frees=[False])
+    assert alone.indices.tolist() == handle_nodes(LINE, [_at(9.0)], free_radius=2.0).indices.tolist()
+    with pytest.raises(ValueError, match=r"frees must have shape \(1,\)"):
+        handle_nodes(LINE, [_at(0.0)], frees=[True, False])
+
+
 def test_without_handles_the_free_radius_pins_nothing():
     handles = handle_nodes(LINE, [], [_at(0.0)], free_radius=1.0)
     assert handles.indices.tolist() == [0]

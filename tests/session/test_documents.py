@@ -9,9 +9,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from splap_editor.core.graph.options import GraphOptions
 from splap_editor.core.handle_nodes import Region
 from splap_editor.core.pose import Pose
 from splap_editor.core.progress import Cancelled
+from splap_editor.engine.edit import Edit
 from splap_editor.engine.keyframes import edit_at_frame, keyed_edit
 from splap_editor.io.session_file import SessionFileError, read_session_file
 from splap_editor.io.session_specs import ViewSpec
@@ -151,6 +153,21 @@ def test_an_edit_is_dirty_until_it_is_saved_and_clean_again_when_undone(desk, tm
     assert documents.is_dirty
     session.history.redo()
     assert not documents.is_dirty
+
+
+def test_what_a_session_still_has_is_lost_when_it_is_deleted_only_in_the_window(desk, tmp_path):
+    desk.open_ply()
+    desk.session.steps.add_pin(Region(np.zeros(3), 0.1))
+    desk.save(tmp_path / "a.splap")
+    assert not desk.documents.would_lose
+    desk.session.steps.change_edit(desk.scene.edit.without_pins([1]), "Delete pin")
+    assert desk.documents.would_lose
+
+
+@pytest.mark.parametrize("mend", [{"cut": ((0, 1),)}, {"add": ((0, 1),)}])
+def test_a_mend_is_work(mend):
+    edit = Edit().with_options(GraphOptions(**mend))
+    assert edit.has_work and not Edit().has_work
 
 
 def test_saving_without_a_name_is_refused(desk):

@@ -13,10 +13,13 @@ from splap_editor.core.bbw.options import BbwOptions
 from splap_editor.core.reach_options import ReachOptions
 from splap_editor.engine import scripting, surface_stages
 from splap_editor.engine.cache import StageCache
-from splap_editor.engine.edit import Pose
+from splap_editor.engine.edit import PIN_COLOR, Pose, binds_like
+from splap_editor.engine.recipe_edit import recipe_of
 from splap_editor.io.ply import read_ply
+from splap_editor.io.recipe import recipe_from_json, recipe_to_json
 from splap_editor.resources import resource
 from splap_editor.session import work
+from splap_editor.session.documents import Documents
 from splap_editor.session.edit_file import write_edit
 from splap_editor.session.placement import disc_rows, held_pose, rows_region
 from splap_editor.session.session import Session
@@ -130,6 +133,7 @@ def test_a_cancelled_drag_leaves_no_trace(main, opened):
 
 
 def test_what_is_exported_is_what_is_shown_and_what_the_command_line_makes(main, opened, tmp_path):
+    documents = Documents(opened, main.post)
     bent(main, opened)
     reports = []
     opened.exported.connect(reports.append)
@@ -138,6 +142,8 @@ def test_what_is_exported_is_what_is_shown_and_what_the_command_line_makes(main,
     opened.export(tmp_path / "window.ply")
     main.run_until(lambda: reports)
     assert not opened.has_unexported_edit
+    assert documents.would_lose, "the file has no handle"
+    documents.close()
     written = read_ply(tmp_path / "window.ply").splats
     np.testing.assert_array_equal(written.means, opened.scene.kernels.means.astype(np.float32))
     assert reports[0].n_changed == np.count_nonzero(opened.scene.kernels.changed)
@@ -308,6 +314,27 @@ def test_a_handle_placed_on_a_moved_part_moves_nothing(main, opened):
     moved = np.linalg.norm(scene.kernels.means - before, axis=1)
     # Holding a disc rigidly where it bent a little shifts it by a small share of the bend.
     assert moved.max() < 0.01 * scene.ellipses.scene_scale
+
+
+def test_a_pin_put_on_a_moved_part_moves_nothing_near_or_far(main, opened):
+    handle, scene = bent(main, opened), opened.scene
+    far = 0.4 * scene.ellipses.scene_scale
+    opened.steps.change_edit(scene.edit.with_options(ReachOptions(far)), "Free less")
+    main.run_until(lambda: opened.state == "settled")
+    before, n_held = scene.kernels.means.copy(), len(opened.bound.handles.indices)
+    moved = np.linalg.norm(before - scene.splats.means, axis=1)
+    is_free = np.isin(np.arange(len(moved)), handle.region.rows, invert=True) & (moved > 0.0)
+    row = int(np.flatnonzero(is_free)[np.argsort(moved[is_free])[is_free.sum() // 4]])
+    region = rows_region(scene, disc_rows(scene, row, 0.03 * scene.ellipses.scene_scale))
+    pin = opened.steps.add_held(region, held_pose(scene, region))
+    main.run_until(lambda: opened.state == "settled")
+    assert n_held < len(opened.bound.handles.indices) <= n_held + len(region.rows)
+    assert np.linalg.norm(scene.kernels.means - before, axis=1).max() < 0.01 * scene.ellipses.scene_scale
+    assert scene.active_handles == (handle.handle_id,) and (pin.name, pin.color) == ("Pin 2", PIN_COLOR)
+    assert opened.steps.add_pin(rows_region(scene, np.array([0]))).name == "Pin 3"
+    again = recipe_from_json(recipe_to_json(recipe_of(scene.edit)))
+    assert [spec.frees for spec in again.handles] == [True, False]
+    assert not binds_like(scene.edit, scene.edit.with_handle(replace(pin, frees=True)))
 
 
 def test_a_disabled_handle_lets_go(main, opened):

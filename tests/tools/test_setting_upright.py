@@ -160,6 +160,22 @@ def test_a_typed_length_becomes_the_true_one(hand):
     assert hand.scene.edit.place.is_identity
 
 
+def test_a_number_typed_too_early_and_a_backspace_too_many_stay_with_the_measure(hand):
+    hand.placed()
+    tool = taken_up(hand, "measure")
+    assert hand.key("3") and hand.key("Backspace")
+    assert hand.context.hud.text == "Click both ends, then type the true length"
+    hand.key("Esc")
+    assert not hand.context.hud.text
+    hand.click(hand.surface())
+    assert hand.key("3") and "Click both ends" in hand.context.hud.text
+    two_ends(hand)
+    assert hand.key("3") and "[3]" in hand.context.hud.text
+    for _ in range(3):
+        assert hand.key("Backspace")
+    assert tool.rows and "type the true length" in hand.context.hud.text
+
+
 def test_an_end_is_dragged_from_splat_to_splat(hand):
     tool = taken_up(hand, "measure")
     hand.click(hand.surface())

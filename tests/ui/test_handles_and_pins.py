@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QCoreApplication, QPoint, Qt
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
 
 from splap_editor.core.handle_nodes import Region
 from splap_editor.core.pose import Pose
@@ -52,6 +53,24 @@ def test_a_pin_is_listed_named_chosen_and_deleted(driver):
         driver.session.history.undo()
     assert [pin.name for pin in driver.scene.edit.pins] == ["Foot", "Pin 2"]
     driver.wait_idle()
+
+
+def test_a_click_on_a_name_leaves_the_keys_with_the_picture_and_a_double_click_edits_it(driver):
+    panel, (first, _) = driver.window.handles_panel, at_ends(driver)
+    name, window = panel.handle_rows[first.handle_id].name, driver.window
+    driver.move(driver.surface_pixel())
+    driver.key(Qt.Key.Key_E)
+    QTest.mouseClick(name, Qt.MouseButton.LeftButton)
+    assert driver.scene.active_handles == (first.handle_id,)
+    QTest.keyClick(QApplication.focusWidget(), Qt.Key.Key_W)
+    assert name.text() == first.name and window.tools.chosen.name == "handle"
+    for end, kept in ((Qt.Key.Key_Escape, first.name), (Qt.Key.Key_Return, "W")):
+        QTest.mouseDClick(name, Qt.MouseButton.LeftButton)
+        QTest.keyClicks(name, "W")
+        assert window.tools.chosen.name == "handle" and name.text() == "W"
+        QTest.keyClick(name, end)
+        assert driver.scene.edit.handle(first.handle_id).name == kept == name.text()
+        assert window.viewport.hasFocus() and name.isReadOnly()
 
 
 def test_the_reach_of_a_pin_is_a_number(driver):

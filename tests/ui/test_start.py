@@ -41,19 +41,25 @@ app = QApplication(sys.argv)
 from splap_editor.app import make_window
 QSettings.setDefaultFormat(QSettings.Format.IniFormat)
 QSettings.setPath(QSettings.Format.IniFormat, QSettings.Scope.UserScope, sys.argv[1])
+from splap_editor.ui.main_window import FRAME, MainWindow
+moves = []
+MainWindow.move = lambda self, *to: moves.append(to)
 window = make_window()
 window.show()
 app.processEvents()
-print(window.screen().availableGeometry().contains(window.frameGeometry()), flush=True)
+room = window.screen().availableGeometry()
+most = room.size() - FRAME
+framed = window.isMaximized() or most.expandedTo(window.size()) == most
+print(room.contains(window.frameGeometry()), framed, window.isMaximized(), len(moves), flush=True)
 window.close()
 """
 
 
-def test_the_window_fits_the_screen_at_twice_the_scale(tmp_path):
-    # First as large as a window is by itself, then as it was kept on a screen of the plain scale.
-    for scale in ("2", "1", "2"):
+def test_the_window_and_its_frame_fit_the_screen_and_stay_where_they_were(tmp_path):
+    # By itself; as it was kept, and nothing moves it; as large at twice the scale, where it fills the screen.
+    for scale, is_full in (("1", False), ("1", False), ("2", True)):
         environment = {**os.environ, "QT_SCALE_FACTOR": scale}
         done = subprocess.run(
             [sys.executable, "-c", FIT, str(tmp_path)], env=environment, capture_output=True, text=True, check=True
         )
-        assert done.stdout == "True\n" and done.stderr == ""
+        assert done.stdout == f"True True {is_full} 0\n" and done.stderr == ""

@@ -154,7 +154,13 @@ class FileActions:
             f"Your work on {scene.file.path.name} has not been saved.",
             parent=self._window,
         )
-        box.setInformativeText("It is lost when another file is opened or the window is closed.")
+        is_exported = not self._session.has_unexported_edit
+        box.setInformativeText(
+            "An export keeps the shape, not what it was made by: handles, pins and keys are lost when another file is "
+            "opened or the window is closed."
+            if is_exported
+            else "It is lost when another file is opened or the window is closed."
+        )
         box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         save = box.addButton("Save" if self._documents.path else "Save…", QMessageBox.ButtonRole.AcceptRole)
         export = box.addButton("Export…", QMessageBox.ButtonRole.AcceptRole)

@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from splap_editor.core.handle_nodes import Region
 from splap_editor.core.pose import Pose
 from splap_editor.session.pivot import Pivot
-from splap_editor.session.placement import rows_region
+from splap_editor.session.placement import held_pose, rows_region
 from splap_editor.session.session import Session
 from splap_editor.viewport.viewport import Viewport
 
@@ -19,12 +20,18 @@ class HandleActions:
         self._viewport = viewport
 
     def from_selection(self) -> None:
-        """Make the selected splats a handle."""
-        self._session.steps.add_handle(self._selected_region())
+        """Make the selected splats a handle, which moves nothing by itself."""
+        region = self._selected_region()
+        self._session.steps.add_handle(region, pose=held_pose(self._session.shown_scene, region))
 
     def pin_selection(self) -> None:
-        """Hold the selected splats where they are."""
-        self._session.steps.add_pin(self._selected_region())
+        """Hold the selected splats where they are: where they have gone, if they have."""
+        region = self._selected_region()
+        pose = held_pose(self._session.shown_scene, region)
+        if pose.is_identity:
+            self._session.steps.add_pin(region)
+        else:
+            self._session.steps.add_held(region, pose)
 
     def pin_rest(self) -> None:
         """Hold all that is not selected, as one pin; of what handles hold, these stay the masters."""
@@ -72,6 +79,6 @@ class HandleActions:
         if any(not edit.handle(handle_id).pose.is_identity for handle_id in handle_ids):
             self._session.steps.change_edit(edit.with_poses(dict.fromkeys(handle_ids, Pose())), label)
 
-    def _selected_region(self):
+    def _selected_region(self) -> Region:
         scene = self._session.shown_scene
         return rows_region(scene, np.flatnonzero(scene.selection))

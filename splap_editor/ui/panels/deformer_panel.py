@@ -123,7 +123,7 @@ class DeformerPanel(QWidget):
             "preparing": ("Preparing: handles can be placed.", ""),
             "ready": ("At rest: no handle is placed.", "quiet"),
             "binding": ("Getting ready to bend.", ""),
-            "dragging": ("Following the drag.", ""),
+            "dragging": ("Following; it settles at rest.", ""),
             "settling": ("Settling.", ""),
             "settled": ("Settled.", ""),
             "halted": ("Stopped; the picture may lag behind the handles.", "warning"),

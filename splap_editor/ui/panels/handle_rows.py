@@ -6,13 +6,14 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtGui import QColor, QMouseEvent
+from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent
 from PySide6.QtWidgets import QCheckBox, QColorDialog, QFrame, QHBoxLayout, QLineEdit, QToolButton, QWidget
 
 from splap_editor.core.pose import Pose
 from splap_editor.engine.edit import PIN_COLOR, Handle, Pin
 from splap_editor.ui.theme import STEP, icon
 from splap_editor.ui.widgets.plain_text import PlainLabel
+from splap_editor.ui.widgets.widget_gestures import WidgetGestures
 
 if TYPE_CHECKING:
     from splap_editor.ui.panels.handles_panel import HandlesPanel
@@ -63,26 +64,59 @@ class ListRow(QFrame):
         self._choose(bool(event.modifiers() & _MORE))
 
     def _on_renamed(self) -> None:
-        self.name.clearFocus()
         self._rename(self.name.text().strip())
 
 
 class NameField(QLineEdit):
-    """A name that is edited in place; a click chooses its row too, and with Shift or Ctrl does no more than that."""
+    """A name that a double click edits in place; a click chooses its row and leaves the keys with the picture."""
+
+    gestures = WidgetGestures("Handles", (("Double click on a name in the list", "Rename it"),))
 
     def __init__(self, choose: Callable[[bool], None]) -> None:
         super().__init__()
-        self.setToolTip("Rename")
+        self.setToolTip("Double click to rename")
         self.setObjectName("nameField")
         self._choose = choose
+        self._before = ""
+        self.editingFinished.connect(self._rest)
+        self._rest()
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        """Choose the row, and edit."""
-        if event.modifiers() & _MORE:
-            self._choose(True)
+        """Choose the row; while the name is edited, put the caret there."""
+        if self.isReadOnly():
+            self._choose(bool(event.modifiers() & _MORE))
+        else:
+            super().mousePressEvent(event)
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Select text only while the name is edited."""
+        if not self.isReadOnly():
+            super().mouseMoveEvent(event)
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        """Edit the name."""
+        if not self.isReadOnly():
+            super().mouseDoubleClickEvent(event)
             return
-        self._choose(False)
-        super().mousePressEvent(event)
+        self._before = self.text()
+        self.setReadOnly(False)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setCursor(Qt.CursorShape.IBeamCursor)
+        self.setFocus()
+        self.selectAll()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Escape leaves the name as it was."""
+        if event.key() == Qt.Key.Key_Escape:
+            self.setText(self._before)
+        super().keyPressEvent(event)
+
+    def _rest(self) -> None:
+        """Be a label again, which no key goes to."""
+        self.setReadOnly(True)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.setCursor(Qt.CursorShape.ArrowCursor)
+        self.deselect()
 
 
 class HandleRow(ListRow):
@@ -110,7 +144,8 @@ class HandleRow(ListRow):
     def show_handle(self, handle: Handle) -> None:
         """Show a handle's name, colour and state."""
         self._color = handle.color
-        self.swatch.setStyleSheet(swatch_style(handle.color, "7px"))
+        # One that only holds looks like the pin it is.
+        self.swatch.setStyleSheet(swatch_style(handle.color, "7px" if handle.frees else "0px"))
         if not self.name.hasFocus():
             self.name.setText(handle.name)
         self.is_enabled.setChecked(handle.enabled)

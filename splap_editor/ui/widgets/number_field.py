@@ -64,13 +64,12 @@ class NumberField(QDoubleSpinBox):
             event.ignore()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Enter takes what was typed, Escape drops it; both leave the keyboard to the window."""
+        """Enter takes what was typed, Escape drops it; the window then has the keyboard go to the picture."""
         if event.key() == Qt.Key.Key_Escape:
             self.setValue(self.value())
             self.lineEdit().setModified(False)
         super().keyPressEvent(event)
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Escape):
-            self.clearFocus()
             event.ignore()
 
 
