@@ -8,6 +8,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.splats.smallest_box import smallest_box
 
 _SAMPLE = 40_000
@@ -68,7 +69,9 @@ class MainSubject:
         return inside
 
 
-def main_subject(points: NDArray[np.floating], opacities: NDArray[np.floating]) -> MainSubject:
+def main_subject(
+    points: NDArray[np.floating], opacities: NDArray[np.floating], progress: Progress = no_progress
+) -> MainSubject:
     """Find what a capture is of, floaters and haze left out.
 
     A surface is dense and its splats are neighbours of each other: those whose
@@ -84,6 +87,8 @@ def main_subject(points: NDArray[np.floating], opacities: NDArray[np.floating]) 
         Finite centres in world units.
     opacities : (n,) float
         In (0, 1].
+    progress : Progress
+        Told the share of steps taken; may cancel.
 
     Returns
     -------
@@ -94,26 +99,36 @@ def main_subject(points: NDArray[np.floating], opacities: NDArray[np.floating]) 
         return MainSubject(0.0, np.zeros(3), np.zeros((3, 3)))
     centers = np.asarray(points, np.float64)
     middle = centers.mean(axis=0)
-    sample = _sample(centers - middle, np.asarray(opacities, np.float64))
-    kept = sample[_subject_of(sample)] if len(sample) > 4 * _K else sample
-    center, half_axes = smallest_box(kept)
+    sample = _sample(centers - middle, np.asarray(opacities, np.float64), part_of(progress, 0.0, 0.6))
+    progress(0.6)
+    kept = sample[_subject_of(sample, part_of(progress, 0.6, 0.9))] if len(sample) > 4 * _K else sample
+    progress(0.9)
+    center, half_axes = smallest_box(kept, part_of(progress, 0.9, 1.0))
     return MainSubject(2.0 * float(np.linalg.norm(half_axes[0])), center + middle, half_axes)
 
 
-def _sample(points: NDArray[np.float64], opacities: NDArray[np.float64]) -> NDArray[np.float64]:
+def _sample(points: NDArray[np.float64], opacities: NDArray[np.float64], progress: Progress) -> NDArray[np.float64]:
     """Points that are not faint, thinned evenly over their opacities, which have nothing to do with place."""
     visible = opacities >= _FAINT * np.median(opacities)
+    progress(0.2)
     points, opacities = points[visible], opacities[visible]
     step = -(-len(points) // _SAMPLE)
     if step == 1:
         return points
-    return points[np.lexsort((np.einsum("ij,ij->i", points, points), opacities))[::step]]
+    progress(0.4)
+    # By opacity and then by distance, one sort after the other.
+    order = np.argsort(np.einsum("ij,ij->i", points, points), kind="stable")
+    progress(0.6)
+    return points[order[np.argsort(opacities[order], kind="stable")[::step]]]
 
 
-def _subject_of(points: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _subject_of(points: NDArray[np.float64], progress: Progress) -> NDArray[np.bool_]:
     """Which points the subject is made of."""
     n = len(points)
-    distances, neighbors = cKDTree(points).query(points, _K + 1)
+    tree = cKDTree(points)
+    progress(0.2)
+    distances, neighbors = tree.query(points, _K + 1)
+    progress(0.5)
     row_ends = np.arange(0, n * _K + 1, _K)
     near = sparse.csr_array((np.ones(n * _K, np.int32), neighbors[:, 1:].ravel(), row_ends), shape=(n, n))
     spacings = distances[:, -1]
@@ -125,6 +140,7 @@ def _subject_of(points: NDArray[np.float64]) -> NDArray[np.bool_]:
     chosen = np.zeros(n, bool)
     least = 1.0
     while len(where):
+        progress(0.9)
         group = _grown(points[where], labels)
         if group.sum() < least:
             break

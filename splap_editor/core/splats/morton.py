@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.progress import Progress, no_progress
+
 _BITS = 21
 _SPREAD = (
     (32, 0x1F00000000FFFF),
@@ -36,7 +38,7 @@ def morton_codes(points: NDArray[np.float64]) -> NDArray[np.uint64]:
     return _spread(cells[:, 0]) | _spread(cells[:, 1]) << np.uint64(1) | _spread(cells[:, 2]) << np.uint64(2)
 
 
-def morton_order(points: NDArray[np.float64]) -> NDArray[np.int64]:
+def morton_order(points: NDArray[np.float64], progress: Progress = no_progress) -> NDArray[np.int64]:
     """Permutation that sorts points along the Z-order curve.
 
     It depends on where the points are and not on the order they come in, as
@@ -46,6 +48,8 @@ def morton_order(points: NDArray[np.float64]) -> NDArray[np.int64]:
     ----------
     points : (n, 3) float64
         Finite positions, any unit.
+    progress : Progress
+        Told the share of steps taken; may cancel.
 
     Returns
     -------
@@ -53,7 +57,9 @@ def morton_order(points: NDArray[np.float64]) -> NDArray[np.int64]:
         Index of the point that comes first, second, ...
     """
     codes = morton_codes(points)
+    progress(0.4)
     order = np.argsort(codes, kind="stable")
+    progress(0.8)
     ordered = codes[order]
     tied = np.zeros(len(codes), bool)
     tied[1:] = ordered[1:] == ordered[:-1]

@@ -1,5 +1,6 @@
 """Occupancy ellipses: the part of each splat that is really there."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
@@ -8,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.index_spaces import FileMask, FileRows, Nodes
-from splap_editor.core.progress import Progress, no_progress
+from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.splats.main_subject import MainSubject, main_subject
 from splap_editor.core.splats.morton import morton_order
 from splap_editor.core.splats.rotations import quats_to_matrices
@@ -19,6 +20,8 @@ MIN_CONTRIBUTION = 1.0 / 255.0
 
 NEEDLE_FLOOR = 1e-4
 """Least minor semi-axis in units of the major one: a splat of zero width still has a plane and an area."""
+
+_BLOCK_ROWS = 1 << 15
 
 _LENGTHS = (1e-60, 1e60)
 """Scales beyond these have squares that leave float64's range in products of four."""
@@ -139,7 +142,7 @@ def occupancy_ellipses(
     removed : (N,) bool, optional
         Splats that are left out: they are inert, and the subject is found without them.
     progress : Progress
-        Told the share of steps taken, each a pass over all splats; may cancel.
+        Told the share of steps taken, block by block; may cancel.
 
     Returns
     -------
@@ -158,51 +161,61 @@ def occupancy_ellipses(
     """
     if not 0.0 < min_contribution < 1.0:
         raise ValueError(f"min_contribution must lie between 0 and 1, got {min_contribution}")
+    n = splats.n_splats
+    axes, inert = np.empty((n, 3), np.int8), np.empty(n, np.uint8)
+    sigmas, levels = np.empty((n, 2)), np.empty(n)
     with np.errstate(all="ignore"):
         # Rows that overflow or hold NaN are found by their results.
-        scales, opacities = splats.scales, splats.opacities
-        axes = _ordered_axes(scales, splats.normal_axis)
-        sigmas = np.take_along_axis(scales, axes[:, :2].astype(np.int64), axis=1)
-        thresholds = np.zeros(splats.n_splats) if splats.thresholds is None else np.abs(splats.thresholds)
-        levels = np.maximum(thresholds.astype(np.float64), min_contribution / opacities)
-        progress(0.2)
-        inert = _inert_reasons(splats, sigmas, opacities, thresholds, min_contribution)
-        progress(0.3)
+        scales = splats.scales
+        progress(0.1)
+        opacities = splats.opacities
+        for block in _blocks(n, part_of(progress, 0.15, 0.4)):
+            axes[block] = _ordered_axes(scales[block], splats.normal_axis)
+            sigmas[block] = np.take_along_axis(scales[block], axes[block, :2].astype(np.int64), axis=1)
+            thresholds = np.zeros(len(axes[block])) if splats.thresholds is None else np.abs(splats.thresholds[block])
+            levels[block] = np.maximum(thresholds.astype(np.float64), min_contribution / opacities[block])
+            inert[block] = _inert_reasons(splats, block, sigmas[block], thresholds, min_contribution)
         if removed is not None:
             inert[removed] = InertReason.REMOVED
         rows = np.flatnonzero(inert == InertReason.ACTIVE)
-        rows = rows[morton_order(np.asarray(splats.means[rows], np.float64))]
+        rows = rows[morton_order(np.asarray(splats.means[rows], np.float64), part_of(progress, 0.4, 0.5))]
     centers = np.ascontiguousarray(splats.means[rows], np.float64)
+    axes, sigmas, opacities = axes[rows], sigmas[rows], np.asarray(opacities[rows], np.float64)
+    semi_axes, normals = np.empty((len(rows), 2, 3)), np.empty((len(rows), 3))
     cutoffs = np.sqrt(-2.0 * np.log(levels[rows]))
-    progress(0.5)
-    axes = axes[rows]
-    columns = np.take_along_axis(
-        quats_to_matrices(np.asarray(splats.quats[rows], np.float64)).swapaxes(1, 2),
-        axes[:, :, None].astype(int),
-        axis=1,
-    )
-    progress(0.6)
-    major = cutoffs * sigmas[rows, 0]
-    minor = np.maximum(cutoffs * sigmas[rows, 1], NEEDLE_FLOOR * major)
-    semi_axes = columns[:, :2] * np.stack([major, minor], axis=1)[:, :, None]
-    progress(0.8)
+    major = cutoffs * sigmas[:, 0]
+    for block in _blocks(len(rows), part_of(progress, 0.5, 0.8)):
+        matrices = quats_to_matrices(np.asarray(splats.quats[rows[block]], np.float64))
+        columns = np.take_along_axis(matrices.swapaxes(1, 2), axes[block, :, None].astype(int), axis=1)
+        minor = np.maximum(cutoffs[block] * sigmas[block, 1], NEEDLE_FLOOR * major[block])
+        semi_axes[block] = columns[:, :2] * np.stack([major[block], minor], axis=1)[:, :, None]
+        normals[block] = np.cross(columns[:, 0], columns[:, 1])
     return Ellipses(
         rows=rows,
         centers=centers,
-        semi_axes=np.ascontiguousarray(semi_axes),
-        normals=np.cross(columns[:, 0], columns[:, 1]),
+        semi_axes=semi_axes,
+        normals=normals,
         cutoffs=cutoffs,
         axes=axes,
-        opacities=np.asarray(opacities[rows], np.float64),
-        subject=_subject(centers, opacities[rows], major),
-        n_splats=splats.n_splats,
+        opacities=opacities,
+        subject=_subject(centers, opacities, major, part_of(progress, 0.8, 1.0)),
+        n_splats=n,
         inert=inert,
     )
 
 
-def _subject(centers: NDArray[np.float64], opacities: NDArray[np.float64], major: NDArray[np.float64]) -> MainSubject:
+def _blocks(n: int, progress: Progress) -> Iterator[slice]:
+    """Rows to be looked at together; ``progress`` may cancel before each of them."""
+    for lo in range(0, n, _BLOCK_ROWS):
+        progress(lo / n)
+        yield slice(lo, lo + _BLOCK_ROWS)
+
+
+def _subject(
+    centers: NDArray[np.float64], opacities: NDArray[np.float64], major: NDArray[np.float64], progress: Progress
+) -> MainSubject:
     """The main subject; where all centres coincide, a cube as large as the largest splat, or of side 1."""
-    subject = main_subject(centers, opacities)
+    subject = main_subject(centers, opacities, progress)
     if subject.size > 0.0:
         return subject
     half = float(major.max(initial=0.0)) or 0.5
@@ -221,18 +234,19 @@ def _ordered_axes(scales: NDArray[np.float64], normal_axis: int | None) -> NDArr
 
 def _inert_reasons(
     splats: Splats,
+    block: slice,
     sigmas: NDArray[np.float64],
-    opacities: NDArray[np.float64],
     thresholds: NDArray[np.floating],
     min_contribution: float,
 ) -> NDArray[np.uint8]:
-    """(N,) reason why each splat is inert; where several hold, the one that says most about the file."""
-    reasons = np.zeros(splats.n_splats, np.uint8)
+    """Reason why each splat of a block is inert; where several hold, the one that says most about the file."""
+    scales, opacities, quats = splats.scales[block], splats.opacities[block], splats.quats[block]
+    reasons = np.zeros(len(scales), np.uint8)
     reasons[sigmas[:, 0] < _LENGTHS[0]] = InertReason.ZERO_SIZE
     reasons[thresholds >= 1.0] = InertReason.THRESHOLD
     reasons[min_contribution / opacities >= 1.0] = InertReason.TRANSPARENT
-    reasons[~np.any(splats.quats, axis=1)] = InertReason.ZERO_QUATERNION
-    finite = np.isfinite(opacities) & np.isfinite(thresholds) & (splats.scales < _LENGTHS[1]).all(axis=1)
-    finite &= np.isfinite(splats.quats).all(axis=1) & (np.abs(splats.means) < _LENGTHS[1]).all(axis=1)
+    reasons[~np.any(quats, axis=1)] = InertReason.ZERO_QUATERNION
+    finite = np.isfinite(opacities) & np.isfinite(thresholds) & (scales < _LENGTHS[1]).all(axis=1)
+    finite &= np.isfinite(quats).all(axis=1) & (np.abs(splats.means[block]) < _LENGTHS[1]).all(axis=1)
     reasons[~finite] = InertReason.NON_FINITE
     return reasons

@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from splap_editor.core.progress import Progress, no_progress, part_of
+
 _N_SUPPORTS = 100
 """Directions an octant in which the outermost points are looked for: 5 degrees apart."""
 
@@ -15,7 +17,9 @@ _FINEST_RAD = 1e-8
 _MOST_STEPS = 100
 
 
-def smallest_box(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def smallest_box(
+    points: NDArray[np.float64], progress: Progress = no_progress
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Find the box about points whose three sides have the least sum.
 
     Unlike the axis-aligned box it turns with the points; unlike that along
@@ -27,6 +31,8 @@ def smallest_box(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDAr
     ----------
     points : (n, 3) float64
         At least one.
+    progress : Progress
+        Told the share of steps taken; may cancel.
 
     Returns
     -------
@@ -37,8 +43,8 @@ def smallest_box(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDAr
     mean = points.mean(axis=0)
     centered = points - mean
     _, principal = np.linalg.eigh(centered.T @ centered)
-    extremes = _outermost(centered @ principal)
-    frame = principal @ _best_frame(extremes)
+    extremes = _outermost(centered @ principal, part_of(progress, 0.0, 0.5))
+    frame = principal @ _best_frame(extremes, part_of(progress, 0.5, 1.0))
     along = centered @ frame
     low, high = along.min(axis=0), along.max(axis=0)
     order = np.argsort(low - high, kind="stable")
@@ -46,28 +52,32 @@ def smallest_box(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDAr
     return mean + frame @ (0.5 * (low + high)), (frame * half).T[order]
 
 
-def _outermost(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _outermost(points: NDArray[np.float64], progress: Progress) -> NDArray[np.float64]:
     """Points that lie farthest out in some direction of a fixed set, which mirroring an axis does not change."""
     i = np.arange(_N_SUPPORTS) + 0.5
     z = i / _N_SUPPORTS
     angle = 0.5 * np.pi * ((i * 0.5 * (np.sqrt(5.0) - 1.0)) % 1.0)
     flat = np.sqrt(1.0 - z * z)
     octant = np.column_stack([flat * np.cos(angle), flat * np.sin(angle), z])
-    found = []
+    found: list[NDArray[np.intp]] = []
     # A direction and its opposite share the products.
     for signs in product((1.0,), (-1.0, 1.0), (-1.0, 1.0)):
         for directions in np.array_split(octant * signs, 10):
             along = points @ directions.T
+            progress(len(found) / 80)
             found += [along.argmin(axis=0), along.argmax(axis=0)]
     return points[np.unique(np.concatenate(found))]
 
 
-def _best_frame(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _best_frame(points: NDArray[np.float64], progress: Progress) -> NDArray[np.float64]:
     """(3, 3) rotation whose columns are the directions in which the widths of the points have the least sum."""
     steps = np.array(list(product(np.linspace(-1.0, 1.0, 5), repeat=3)))
     frames = _starts()
     best = frames[np.argsort(_sums(points, frames), kind="stable")[:_N_STARTS]]
-    results = [_descended(points, frame, steps) for frame in best]
+    results = []
+    for done, frame in enumerate(best):
+        progress(done / len(best))
+        results.append(_descended(points, frame, steps))
     return min(results, key=lambda result: result[0])[1]
 
 

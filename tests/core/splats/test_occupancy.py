@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from splap_editor.core.progress import Cancelled
 from splap_editor.core.splats.occupancy import InertReason, occupancy_ellipses
 from tests.core.splat_scenes import SIGMA_CUT, ball, cloud, moved, shuffled, splats_of
 from tests.reference.graph import occupancy_ellipse
@@ -111,3 +112,23 @@ def test_coinciding_splats_have_the_size_of_the_largest():
 def test_a_least_contribution_outside_0_to_1_is_rejected(least):
     with pytest.raises(ValueError, match="min_contribution must lie between 0 and 1"):
         occupancy_ellipses(ball(3), min_contribution=least)
+
+
+def test_it_can_be_stopped_between_any_two_blocks_of_rows():
+    splats = cloud(70_000)
+    told = []
+    ellipses = occupancy_ellipses(splats, progress=told.append)
+    assert told == sorted(told) and len(told) > 40
+    for at in (1, len(told) // 2, len(told) - 1):
+        left = iter(range(at))
+
+        def stop(share, left=left):
+            if next(left, None) is None:
+                raise Cancelled
+
+        with pytest.raises(Cancelled):
+            occupancy_ellipses(splats, progress=stop)
+    # Where the blocks end makes no difference.
+    rows = np.sort(ellipses.rows[::1000])
+    apart, nodes = occupancy_ellipses(splats.at(rows)), ellipses.node_of_row[rows]
+    np.testing.assert_array_equal(apart.semi_axes[apart.node_of_row], ellipses.semi_axes[nodes])
