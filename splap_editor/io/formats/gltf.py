@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.splats.rotations import matrices_to_quats, quat_products, quats_to_matrices
 from splap_editor.core.splats.splats import Splats
-from splap_editor.io.formats.bare_splats import FAINT, OPAQUE, alphas_of, as_bytes
+from splap_editor.io.formats.bare_splats import FAINT, OPAQUE, alphas_of, as_bytes, row_blocks
 from splap_editor.io.formats.source import LARGEST_FILE, Source
 from splap_editor.io.formats.splat32 import log_scales_of
 from splap_editor.io.json_object import parsed_json
@@ -44,7 +44,6 @@ _MOST_ATTRIBUTES = 20
 """Four, and a coefficient of the harmonics each."""
 
 _BLOCK_BYTES = 1 << 22
-_BLOCK_ROWS = 1 << 15
 _EVEN = 1e-4
 
 
@@ -293,22 +292,21 @@ def _fill(sheet: Splats, rows: slice, document: _Document, cloud: _Cloud, progre
                 raise document.source.damaged(f"its splats have no {name}")
             shN[:, at] = numbers(name, 3)
             at += 1
-    with np.errstate(invalid="ignore", over="ignore"):
-        sheet.log_scales[rows] = log_scales_of(numbers(f"{EXTENSION}:SCALE", 3)) + np.float32(np.log(factor))
-    alphas = numbers(f"{EXTENSION}:OPACITY", 1)[:, 0].astype(np.float64)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        sheet.logit_opacities[rows] = np.clip(np.log(alphas) - np.log1p(-alphas), FAINT, OPAQUE)
-    if f"{EXTENSION}:SH_DEGREE_0_COEF_0" in cloud.attributes:
-        sheet.sh0[rows] = numbers(f"{EXTENSION}:SH_DEGREE_0_COEF_0", 3)
-    else:
-        sheet.sh0[rows] = 0
+    scales, alphas = numbers(f"{EXTENSION}:SCALE", 3), numbers(f"{EXTENSION}:OPACITY", 1)[:, 0]
+    has_colors = f"{EXTENSION}:SH_DEGREE_0_COEF_0" in cloud.attributes
+    colors = numbers(f"{EXTENSION}:SH_DEGREE_0_COEF_0", 3) if has_colors else None
     is_moved = np.abs(world - np.eye(4)).max() > 1e-12
-    for lo in range(0, cloud.n_splats, _BLOCK_ROWS):
-        block = slice(lo, min(lo + _BLOCK_ROWS, cloud.n_splats))
+    for block in row_blocks(cloud.n_splats, part_of(progress, 0.5, 1.0)):
         to = slice(rows.start + block.start, rows.start + block.stop)
+        with np.errstate(invalid="ignore", over="ignore"):
+            sheet.log_scales[to] = log_scales_of(scales[block]) + np.float32(np.log(factor))
+        exact = alphas[block].astype(np.float64)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            sheet.logit_opacities[to] = np.clip(np.log(exact) - np.log1p(-exact), FAINT, OPAQUE)
+        sheet.sh0[to] = 0 if colors is None else colors[block]
         parts = means[block], quats[block], shN[block]
         sheet.means[to], sheet.quats[to], sheet.shN[to] = _moved(*parts, world, turn) if is_moved else parts
-        progress(0.5 + 0.5 * block.stop / cloud.n_splats)
+    progress(1.0)
 
 
 def _moved(

@@ -308,18 +308,20 @@ def write(out: BinaryIO, splats: Splats, progress: Progress) -> None:
         logarithms = np.sign(means) * np.log1p(np.abs(means))
         low, high = logarithms.min(axis=0), logarithms.max(axis=0)
         cells = np.rint(65535 * (logarithms - low) / np.where(high > low, high - low, 1)).astype(np.uint16)
-        names = [
-            put("means_l.webp", (cells & 255).astype(np.uint8)),
-            put("means_u.webp", (cells >> 8).astype(np.uint8)),
-        ]
+        progress(0.1)
+        names = [put("means_l.webp", (cells & 255).astype(np.uint8))]
+        progress(0.15)
+        names.append(put("means_u.webp", (cells >> 8).astype(np.uint8)))
         meta["means"] = {"mins": low.tolist(), "maxs": high.tolist(), "files": names}
         progress(0.2)
         meta["quats"] = {"files": [put("quats.webp", _packed_rotations(splats.quats[order]))]}
         progress(0.3)
         values, labels = codebook(splats.log_scales[order])
+        progress(0.35)
         meta["scales"] = {"codebook": values.tolist(), "files": [put("scales.webp", labels)]}
         progress(0.4)
         values, labels = codebook(splats.sh0[order])
+        progress(0.45)
         alphas = as_bytes(alphas_of(splats.logit_opacities[order]) * 255)
         pixels = np.column_stack([labels, alphas])
         meta["sh0"] = {"codebook": values.tolist(), "files": [put("sh0.webp", pixels)]}
@@ -333,15 +335,14 @@ def write(out: BinaryIO, splats: Splats, progress: Progress) -> None:
 def _put_harmonics(put: Callable[..., str], shN: NDArray[np.float32], progress: Progress) -> dict[str, Any]:
     """Write palette and labels; what ``meta.json`` says of them."""
     n, n_coefficients, _ = shN.shape
-    entries, chosen = palette(shN.reshape(n, -1), progress)
+    entries, chosen = palette(shN.reshape(n, -1), part_of(progress, 0.0, 0.8))
     values, labels = codebook(entries)
+    progress(0.85)
     rows = math.ceil(len(entries) / 64)
-    names = [
-        put("shN_centroids.webp", labels.reshape(-1, 3), (64 * n_coefficients, rows)),
-        put(
-            "shN_labels.webp", np.column_stack([chosen & 255, chosen >> 8, np.zeros(n, chosen.dtype)]).astype(np.uint8)
-        ),
-    ]
+    names = [put("shN_centroids.webp", labels.reshape(-1, 3), (64 * n_coefficients, rows))]
+    progress(0.9)
+    pixels = np.column_stack([chosen & 255, chosen >> 8, np.zeros(n, chosen.dtype)]).astype(np.uint8)
+    names.append(put("shN_labels.webp", pixels))
     degree = math.isqrt(n_coefficients + 1) - 1
     return {"count": len(entries), "bands": degree, "codebook": values.tolist(), "files": names}
 

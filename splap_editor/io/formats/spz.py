@@ -27,6 +27,9 @@ _ROTATION_BYTES = {1: 3, 2: 3, 3: 4, 4: 4}
 _COLOR_SCALE = 0.15
 _BLOCK_ROWS = 1 << 15
 _CHUNK = 1 << 20
+_PACKED_AT_ONCE = 1 << 18
+"""Bytes that are packed in less than a tenth of a second."""
+
 _GZIP_RATIO = 1040
 """No gzip member unpacks to more than this times its bytes."""
 
@@ -245,8 +248,10 @@ def write(out: BinaryIO, splats: Splats, progress: Progress) -> None:
     out.write(packer.compress(head))
     n_blocks = 6 * -(-splats.n_splats // _BLOCK_ROWS)
     for done, block in enumerate(_blocks(splats, bits)):
-        out.write(packer.compress(block.tobytes()))
-        progress((done + 1) / n_blocks)
+        held = memoryview(block.tobytes())
+        for lo in range(0, len(held), _PACKED_AT_ONCE):
+            out.write(packer.compress(held[lo : lo + _PACKED_AT_ONCE]))
+            progress((done + min((lo + _PACKED_AT_ONCE) / len(held), 1.0)) / n_blocks)
     out.write(packer.flush())
 
 
