@@ -39,7 +39,13 @@ def add_clean(parser: argparse.ArgumentParser) -> None:
 def add_place(parser: argparse.ArgumentParser) -> None:
     """Add the flags of ``splap-editor place``; what they say is done in this order."""
     parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.ply")
-    parser.add_argument("--floor", type=int, nargs="+", metavar="ROW", help="three or more splats of a floor: level it")
+    parser.add_argument(
+        "--floor",
+        type=int,
+        nargs="+",
+        metavar="ROW",
+        help="three or more splats of a floor: level it; those off it count for nothing",
+    )
     parser.add_argument("--up", choices=tuple(UPS), default="z", help="where up is in OUT.ply; default z")
     parser.add_argument("--turn", type=float, nargs=4, metavar=("X", "Y", "Z", "DEGREES"), help="about an axis")
     parser.add_argument("--scale", type=float, metavar="FACTOR")
@@ -94,14 +100,17 @@ def place(options: argparse.Namespace) -> int:
 def _place(options: argparse.Namespace, file: "SplatFile") -> "Place":
     import numpy as np
 
-    from splap_editor.core.place import Place, about, levelled, recentred, sized
+    from splap_editor.core.floor import REACH, floor_plane
+    from splap_editor.core.place import Place, about, laid_level, recentred, sized
     from splap_editor.core.splats.occupancy import occupancy_ellipses
 
-    center = occupancy_ellipses(file.splats).subject.center
+    subject = occupancy_ellipses(file.splats).subject
+    center = subject.center
     x, y, z = center.tolist()
     made = Place((x, y, z))
     if options.floor is not None:
-        made = levelled(made, _points(file, options.floor), np.array(UPS[options.up]), center)
+        floor = floor_plane(_points(file, options.floor), REACH * subject.size)
+        made = laid_level(made, floor.middle, floor.normal, np.array(UPS[options.up]), center)
     if options.turn is not None:
         *axis, degrees = options.turn
         length = float(np.linalg.norm(axis))

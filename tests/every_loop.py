@@ -15,7 +15,6 @@ from splap_editor.core.graph.options import GraphOptions
 from splap_editor.core.handle_nodes import Region
 from splap_editor.core.options import OptionSet
 from splap_editor.core.reach_options import ReachOptions
-from splap_editor.core.splats.contributions import contributions
 from splap_editor.core.splats.floaters import floaters
 from splap_editor.core.splats.spherical_harmonics import view_colors
 from splap_editor.core.splats.splats import Splats
@@ -41,7 +40,7 @@ def call_every_loop() -> None:
     for method in method_titles():
         kernels = _drag(surface, method)
     adapted_splats(splats, kernels)
-    floaters(surface.ellipses, contributions(splats, surface.ellipses))
+    floaters(splats, surface.ellipses).ties.pieces(np.ones(surface.ellipses.n_nodes, np.bool_))
     for method, options in CHOICES:
         bind(surface, _edit(surface, method, options)).pose()
     normal_offsets(surface.ellipses, surface.graph.edges[:4])

@@ -8,6 +8,7 @@ import pytest
 from splap_editor.cli import main
 from splap_editor.io.ply import read_ply
 from splap_editor.resources import resource
+from tests.reference.ply import ply_bytes, splat_columns
 
 TUBE = resource("samples", "tube.ply")
 
@@ -49,6 +50,20 @@ def test_a_place_is_levelled_sized_and_recentred(tmp_path, capsys):
     assert np.linalg.norm(written[a] - written[b]) == pytest.approx(3.0, rel=1e-5)
     M = np.array(facts["matrix"])
     np.testing.assert_allclose(written, means @ M[:3, :3].T + M[:3, 3], atol=1e-5)
+
+
+def test_what_lies_off_the_floor_does_not_tilt_it(tmp_path, capsys):
+    rng = np.random.default_rng(4)
+    columns = splat_columns(90, rng)
+    columns["x"], columns["y"] = rng.uniform(-1.0, 1.0, (2, 90)).astype(np.float32)
+    columns["z"] = (0.3 * columns["x"] + np.where(np.arange(90) < 60, 0.0, 0.4 * (1.0 + columns["x"]))).astype(
+        np.float32
+    )
+    source, out = tmp_path / "floor.ply", tmp_path / "out.ply"
+    source.write_bytes(ply_bytes(columns))
+    told(capsys, "place", str(source), "-o", str(out), "--floor", *map(str, range(90)))
+    heights = np.asarray(read_ply(out).splats.means, np.float64)[:60, 2]
+    assert np.ptp(heights) < 1e-4
 
 
 @pytest.mark.parametrize(

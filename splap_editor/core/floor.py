@@ -7,6 +7,9 @@ from numpy.typing import NDArray
 
 from splap_editor.core.place import fitted_plane
 
+REACH = 0.12
+"""About a place, the floor is looked for within so many sizes of the scene."""
+
 _TRIES = 256
 _FLATNESS = 0.05
 """What is farther from a tried plane than this share of the reach does not speak for it."""
@@ -48,7 +51,7 @@ def floor_plane(points: NDArray[np.floating], reach: float) -> Floor:
     points : (n, 3) float
         About the place that is asked for.
     reach : float
-        Radius they were taken within.
+        Radius they were taken within, or might have been: what counts as flat is a share of it. In their unit.
 
     Raises
     ------

@@ -190,27 +190,6 @@ def fitted_plane(points: NDArray[np.floating]) -> tuple[NDArray[np.float64], NDA
     raise ValueError("a plane needs three points that do not lie on a line: choose others")
 
 
-def levelled(place: Place, floor: NDArray[np.floating], up: NDArray[np.floating], above: NDArray[np.floating]) -> Place:
-    """Turn a place by as little as makes a floor level, about its middle.
-
-    Parameters
-    ----------
-    place : Place
-    floor : (n, 3) float
-        Points of the floor, in the file's coordinates; three or more.
-    up : (3,) float
-        Where up is in what is written, of any length but zero.
-    above : (3,) float
-        A point over the floor, such as the middle of the subject, in the file's coordinates.
-
-    Raises
-    ------
-    ValueError
-        The points lie on a line.
-    """
-    return laid_level(place, *fitted_plane(floor), up, above)
-
-
 def laid_level(
     place: Place,
     middle: NDArray[np.floating],
@@ -225,8 +204,10 @@ def laid_level(
     place : Place
     middle, normal : (3,) float
         The plane, in the file's coordinates; the side of its unit normal means nothing.
-    up, above : (3,) float
-        As of `levelled`.
+    up : (3,) float
+        Where up is in what is written, of any length but zero.
+    above : (3,) float
+        A point over the plane, such as the middle of the subject, in the file's coordinates.
     """
     at = placed_points(np.asarray(middle)[None], place)[0]
     toward = place.rotation @ normal

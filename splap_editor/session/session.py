@@ -51,6 +51,8 @@ class Session:
         # A turned view must not wait behind a scene being prepared, nor behind quantities, edges and previews.
         self.view_worker = Worker(post, name="splap-view")
         self.detail_worker = Worker(post, name="splap-detail")
+        # What is searched for long, ahead of being asked for, is in nobody's way.
+        self.search_worker = Starter(post, name="splap-search")
         # A file that is opened must not wait behind any of them, nor behind another that is slow or blocked.
         self._openings = Starter(post, name="splap-open")
         self.told_job = ToldJob(self._openings, self.worker)
@@ -71,7 +73,7 @@ class Session:
 
     def close(self) -> None:
         """Cancel everything and join the workers, as far as they come to an end in time."""
-        close_all((self._openings, self.worker, self.view_worker, self.detail_worker))
+        close_all((self._openings, self.search_worker, self.worker, self.view_worker, self.detail_worker))
 
     # ------------------------------------------------------------------ what there is
 

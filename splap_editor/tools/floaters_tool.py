@@ -1,4 +1,4 @@
-"""Finding what floats about the subject: one strength, what goes tinted, Return takes it."""
+"""Finding what floats about the subject: one strength, what goes tinted by groups, Return takes it."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -6,14 +6,15 @@ from typing import ClassVar
 import numpy as np
 
 from splap_editor.core.options import option
-from splap_editor.core.progress import Progress
-from splap_editor.session.floater_search import FloaterSearch, FoundFloaters, floater_search
-from splap_editor.session.jobs import Job
-from splap_editor.session.latest_job import LatestJob
-from splap_editor.session.scene_follower import SceneFollower
+from splap_editor.session.floater_preview import FloaterPreview
+from splap_editor.session.floater_search import FoundFloaters
+from splap_editor.session.signals import Signal
 from splap_editor.tools.bindings import Binding
 from splap_editor.tools.crop_tool import GOES_TINT
 from splap_editor.tools.tool import KeyEvent, PointerEvent, Tool, ToolContext
+
+_LIT_TINT = (255, 214, 64, 235)
+"""Of the group that is looked at."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,10 @@ class FloaterOptions:
 
 
 class FloatersTool(Tool):
-    """Looks for floaters once it is in use; the strength changes what is tinted at once."""
+    """Looks for floaters once it is taken up; the strength changes what is tinted at once.
+
+    `changed` tells of other groups, of others that stay, and of another one that is looked at.
+    """
 
     name = "floaters"
     # A handle's gizmo would take the clicks that look at a group.
@@ -48,122 +52,138 @@ class FloatersTool(Tool):
 
     def __init__(self, context: ToolContext) -> None:
         super().__init__(context)
-        self.search: FloaterSearch | None = None
-        self.found: FoundFloaters | None = None
-        self._at = -1
-        self._is_asked = False
+        self.changed = Signal()
+        self.preview = FloaterPreview(context.session)
+        self.looked_at: int | None = None
+        self._is_in_use = self._is_dismissed = False
         self._strength = context.held(FloaterOptions)
-        self._strength.changed.connect(self._show)
-        self._job = LatestJob(context.session.detail_worker, self.name, cancels=True, failed=self._on_failed)
-        SceneFollower(context.session, self.drop, removed_changed=self.drop)
+        self._strength.changed.connect(self._on_strength)
+        self.preview.changed.connect(self._show)
+        self.preview.told.connect(self._tell)
+        self.preview.failed.connect(lambda error: self.context.hud.show(text=str(error)))
 
-    def ask(self) -> None:
+    @property
+    def found(self) -> FoundFloaters | None:
+        """What floats, once it is known."""
+        return self.preview.found
+
+    def taken_up(self) -> None:
+        """Begin to look."""
+        self._is_in_use = True
+        if self.context.session.scene is not None:
+            self.begin()
+
+    def begin(self) -> None:
         """Look for floaters among what is left."""
-        session = self.context.session
-        scene = session.shown_scene
-        splats, removal = scene.splats, scene.edit.removal
-        self._is_asked = True
-        self.context.hud.show(text="Looking for floaters …")
-
-        def make(job: Job) -> FloaterSearch:
-            def stages(stage: str) -> Progress:
-                def progress(share: float) -> None:
-                    job.report(share, stage)
-                    job.deliver(lambda: self._tell(stage, share))
-
-                return progress
-
-            return floater_search(splats, removal, stages=stages)
-
-        def take(search: FloaterSearch) -> None:
-            if session.scene is scene and scene.edit.removal is removal and self._is_asked:
-                self.search = search
-                self._show()
-
-        self._job.ask(make, take)
-
-    def drop(self) -> None:
-        """Show no floaters."""
-        self._job.drop()
-        had, self.search, self.found = self._is_asked, None, None
-        self._is_asked = False
-        if had:
-            self.context.paint(None)
-            self.context.hud.show()
+        self._is_dismissed = False
+        if not self.preview.is_shown:
+            self.context.hud.show(text="Looking for floaters …")
+            self.preview.show(self._strength.value.strength)
 
     def cancel(self) -> None:
         """Show no floaters."""
         super().cancel()
-        self.drop()
-
-    def taken_up(self) -> None:
-        """Begin to look, wherever the pointer is."""
-        if self.context.session.scene is not None:
-            self.ask()
+        self._hide()
+        self._is_in_use = self._is_dismissed = False
 
     def hover(self, event: PointerEvent) -> bool:
-        """Look among what has come since."""
-        if not self._is_asked:
-            self.ask()
+        """Begin to look, as after others were removed."""
+        self._is_in_use = True
+        if not self._is_dismissed:
+            self.begin()
         return False
 
     def frame(self, event: PointerEvent) -> bool:
         """Look at the group under the pointer."""
+        if self._is_dismissed:
+            self.begin()
+            return True
         hit = self.context.viewport.pick(*event.xy)
-        label = None if self.found is None or hit is None else self.found.group_of(hit.row)
-        if label is not None:
-            self._look_at(label)
+        group = None if self.found is None or hit is None else self.found.group_of(hit.row)
+        if group is not None:
+            self.look_at(group)
         return True
 
     def step(self, event: KeyEvent) -> bool:
         """Look at the group before, or the next one; the largest first."""
         found = self.found
-        if found is None or not len(found.rows):
+        if found is None or not found.n_groups:
             return False
-        groups = found.groups
-        self._at += 1 if event.key == "BracketRight" else -1
-        self._look_at(int(groups[self._at % len(groups)]))
+        step = 1 if event.key == "BracketRight" else -1
+        first = 0 if step > 0 else found.n_groups - 1
+        self.look_at(first if self.looked_at is None else (self.looked_at + step) % found.n_groups)
         return True
 
-    def take(self, event: KeyEvent) -> bool:
+    def take(self, event: KeyEvent | None = None) -> bool:
         """Remove them: one step of the history, kept as the strength and not as rows."""
-        if self.search is None:
-            return self._is_asked
-        removal = self.search.removal(self._strength.value.strength)
+        if self.found is None:
+            return self.preview.is_shown
         try:
-            # Other splats removed: `drop` follows, and the next move looks among what is left.
-            self.context.session.steps.change_removal(removal, "Remove floaters")
+            # Other splats removed: the preview is dropped, and the next move looks among what is left.
+            self.context.session.steps.change_removal(self.preview.removal, "Remove floaters")
         except ValueError as error:
             self.context.hud.show(text=f"Nothing was removed: {error}")
         return True
 
-    def _look_at(self, label: int) -> None:
+    def let_go(self, event: KeyEvent | None = None) -> bool:
+        """Leave everything as it is, until the next click."""
+        was_shown = self.preview.is_shown
+        self._hide()
+        self._is_dismissed = True
+        return was_shown
+
+    def look_at(self, group: int) -> None:
+        """Frame a group, and set it off from the others."""
         assert self.found is not None
-        self.context.fly_to(self.context.viewport.frame(self.found.rows_of(label)))
+        self.looked_at = group
+        self._show()
+        self.context.fly_to(self.context.viewport.frame(self.found.rows_of(group)))
+
+    def _hide(self) -> None:
+        if self.preview.is_shown:
+            self.preview.hide()
+
+    def _on_strength(self) -> None:
+        if self.preview.is_shown:
+            self.looked_at = None
+            self.preview.show(self._strength.value.strength)
 
     def _tell(self, stage: str, share: float) -> None:
-        if self._is_asked:
-            words = "weighing what is known of each" if stage == "floaters" else "seeing which splats make the picture"
-            self.context.hud.show(text=f"Looking for floaters – {words}, {share:.0%}")
-
-    def _on_failed(self, error: Exception) -> None:
-        self.context.hud.show(text=str(error))
+        words = {"contributions": "seeing which splats make the picture", "occupancy": "measuring splats"}
+        told = words.get(stage, "weighing what is known of each")
+        self.context.hud.show(text=f"Looking for floaters – {told}, {share:.0%}")
 
     def _show(self) -> None:
-        if self.search is None:
-            return
-        self.found, self._at = self.search.found(self._strength.value.strength), -1
-        tints = np.zeros((self.found.n_splats, 4), np.uint8)
-        tints[self.found.rows] = GOES_TINT
-        self.context.paint(tints)
-        n, k = len(self.found.rows), len(self.found.groups)
-        share = n / max(int(np.count_nonzero(~self.context.session.shown_scene.removed)), 1)
-        groups = f"({share:.1%}) in {k:,} group{'' if k == 1 else 's'} · Return removes, [ ] look at each"
-        self.context.hud.show(text=f"{n:,} splats float {groups}" if n else "Nothing floats at this strength")
+        found = self.found
+        if found is None:
+            self.looked_at = None
+            if self._is_in_use and not self.preview.is_shown:
+                self.context.paint(None)
+                self.context.hud.show()
+        else:
+            goes = self.preview.goes
+            tints = np.zeros((found.n_splats, 4), np.uint8)
+            tints[goes] = GOES_TINT
+            if self.looked_at is not None:
+                tints[found.rows_of(self.looked_at)] = _LIT_TINT
+            self.context.paint(tints)
+            self.context.hud.show(text=self.words(int(np.count_nonzero(goes))))
+        self.changed.emit()
         self.context.viewport.request_render()
+
+    def words(self, n: int) -> str:
+        """How many splats go, for people."""
+        assert self.found is not None
+        if not self.found.n_groups:
+            return "Nothing floats at this strength"
+        k = self.found.n_groups
+        share = n / max(int(np.count_nonzero(~self.context.session.shown_scene.removed)), 1)
+        groups = f"({share:.1%}), {k:,} group{'' if k == 1 else 's'} found"
+        return f"{n:,} splats float {groups} · Return removes, [ ] look at each, Esc leaves"
 
     bindings = (
         Binding(("Click",), frame, "Look at the floaters under the pointer", "look at a group"),
         Binding(("[", "]"), step, "Look at the group of floaters before, or the next", "groups"),
         Binding(("Return", "Enter"), take, "Remove the floaters that are tinted", "remove"),
+        Binding(("Esc",), let_go, "Leave the floaters", "leave"),
     )

@@ -3,16 +3,16 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.floor import floor_plane
+from splap_editor.core.floor import REACH, Floor, floor_plane
+from splap_editor.core.index_spaces import FileRows
 from splap_editor.core.place import fitted_plane, laid_level, recentred_on
+from splap_editor.session.jobs import Job
+from splap_editor.session.latest_job import LatestJob
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.tools.bindings import Binding
 from splap_editor.tools.tool import KeyEvent, PointerEvent, Tool, ToolContext
 from splap_editor.viewport.gizmo import Claim
 from splap_editor.viewport.overlays import circle
-
-REACH = 0.12
-"""A click fits the floor to what lies within so many sizes of the scene, in front."""
 
 FLOOR_TINT = (79, 179, 255, 150)
 _COLOR = (1.0, 0.8, 0.3)
@@ -27,7 +27,8 @@ class LevelTool(Tool):
     def __init__(self, context: ToolContext) -> None:
         super().__init__(context)
         self.points: list[NDArray[np.float64]] = []
-        self._is_shown = False
+        self._is_shown = self._is_asked = False
+        self._job = LatestJob(context.session.detail_worker, self.name, cancels=True, failed=self._on_failed)
         SceneFollower(context.session, self._forget, edit_changed=self._forget)
 
     @property
@@ -36,29 +37,37 @@ class LevelTool(Tool):
         return Claim(None)
 
     def fit(self, event: PointerEvent) -> None:
-        """Level by the floor about the pointer."""
+        """Level by the floor about the pointer, once it is found: that takes looking at all splats."""
         viewport, scene = self.context.viewport, self.context.session.shown_scene
         hit = viewport.pick(*event.xy)
         if hit is None:
             return
         reach = REACH * scene.ellipses.scene_scale
-        near = np.linalg.norm(scene.positions - hit.point, axis=1) <= reach
-        screen, projection = viewport.screen_points(), viewport.projection
-        near &= viewport.in_rectangle(screen, 0, 0, projection.width, projection.height)
-        rows = np.flatnonzero(viewport.visible_only(screen, near))
-        points = np.asarray(scene.positions, np.float64)[rows]
-        self.points = []
-        try:
-            floor = floor_plane(points, reach)
-        except ValueError as error:
-            self.leave()
-            self.context.hud.show(text=str(error))
-            return
-        tints = np.zeros((scene.splats.n_splats, 4), np.uint8)
+        positions, seen_of, edit = scene.positions, viewport.sight(), scene.edit
+        self.leave()
+        self.context.hud.show(text="Looking for the floor …")
+
+        def make(job: Job) -> tuple[FileRows, Floor]:
+            rows = np.flatnonzero(seen_of(np.linalg.norm(positions - hit.point, axis=1) <= reach))
+            return rows, floor_plane(np.asarray(positions[rows], np.float64), reach)
+
+        def take(found: tuple[FileRows, Floor]) -> None:
+            if self.context.session.scene is scene and scene.edit is edit:
+                self._show_floor(*found, reach)
+
+        self._is_asked = True
+        self._job.ask(make, take)
+
+    def _show_floor(self, rows: FileRows, floor: Floor, reach: float) -> None:
+        tints = np.zeros((self.context.session.shown_scene.splats.n_splats, 4), np.uint8)
         tints[rows[floor.inside]] = FLOOR_TINT
         self.context.paint(tints)
         n = int(np.count_nonzero(floor.inside))
         self._show(floor.middle, floor.normal, reach, f"Floor of {n:,} of {len(rows):,} splats in front")
+
+    def _on_failed(self, error: Exception) -> None:
+        self.leave()
+        self.context.hud.show(text=str(error))
 
     def add(self, event: PointerEvent) -> None:
         """Take one of three points."""
@@ -86,11 +95,11 @@ class LevelTool(Tool):
         """Keep what is shown."""
         if self._is_shown:
             self.context.session.drag.commit("Level object")
-        return self._is_shown or bool(self.points)
+        return self._is_shown or self._is_asked or bool(self.points)
 
     def let_go(self, event: KeyEvent) -> bool:
         """Leave the object as it was."""
-        had = self._is_shown or bool(self.points)
+        had = self._is_shown or self._is_asked or bool(self.points)
         self.leave()
         return had
 
@@ -108,7 +117,9 @@ class LevelTool(Tool):
 
     def _forget(self) -> None:
         """Show none of it: the edit is another one, or will be."""
-        had, self._is_shown, self.points = self._is_shown or bool(self.points), False, []
+        self._job.drop()
+        had = self._is_shown or self._is_asked or bool(self.points)
+        self._is_shown, self._is_asked, self.points = False, False, []
         if had:
             self.context.viewport.rings.hide(_RING)
             self.context.paint(None)

@@ -18,6 +18,7 @@ from splap_editor.session.autosave import Autosave
 from splap_editor.session.documents import Documents
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
+from splap_editor.tools.floaters_tool import FloatersTool
 from splap_editor.tools.handle_tool import HandleTool
 from splap_editor.tools.place_tool import PlaceTool
 from splap_editor.tools.select_tool import SelectOptions
@@ -47,6 +48,7 @@ from splap_editor.ui.file_drop import FileDrop
 from splap_editor.ui.inspection import Inspection
 from splap_editor.ui.panels.deformer_panel import DeformerPanel
 from splap_editor.ui.panels.display_panel import DisplayPanel
+from splap_editor.ui.panels.floaters_panel import FloatersPanel
 from splap_editor.ui.panels.handles_panel import HandlesPanel
 from splap_editor.ui.panels.place_panel import PlacePanel
 from splap_editor.ui.panels.scene_panel import ScenePanel
@@ -276,6 +278,9 @@ class MainWindow(FileDrop, QMainWindow):
         self.handles_panel = HandlesPanel(self.session)
         self.deformer_panel = DeformerPanel(self.session)
         self.place_panel = PlacePanel(self.session, self.actions_)
+        floaters = self.tools.tools[FloatersTool.name]
+        assert isinstance(floaters, FloatersTool)
+        self.floaters_panel = FloatersPanel(floaters)
         self.display_panel = DisplayPanel(self.display, self.actions_)
         self.scene_panel = ScenePanel(self.session)
         self.scene_panel.reread.connect(self.files.reread)
@@ -283,15 +288,20 @@ class MainWindow(FileDrop, QMainWindow):
         stack = QVBoxLayout(page)
         stack.setContentsMargins(0, 0, 0, 0)
         stack.setSpacing(0)
-        for title, panel in (
-            ("Handles", self.handles_panel),
-            ("Deformer", self.deformer_panel),
-            ("Place", self.place_panel),
-            ("Display", self.display_panel),
-            *self.inspection.panels,
-            ("Scene", self.scene_panel),
-        ):
-            stack.addWidget(Section(title, panel))
+        panels = {
+            "Handles": self.handles_panel,
+            "Deformer": self.deformer_panel,
+            "Place": self.place_panel,
+            "Floaters": self.floaters_panel,
+            "Display": self.display_panel,
+            **dict(self.inspection.panels),
+            "Scene": self.scene_panel,
+        }
+        sections = {title: Section(title, panel) for title, panel in panels.items()}
+        for section in sections.values():
+            stack.addWidget(section)
+        self.floaters_section = sections["Floaters"]
+        self.floaters_section.setVisible(False)
         stack.addStretch(1)
         scroll = QScrollArea(widgetResizable=True)
         scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
@@ -320,8 +330,11 @@ class MainWindow(FileDrop, QMainWindow):
 
     def _show_tool(self) -> None:
         self.actions_.check(f"tool.{self.tools.chosen.name}")
-        if self.tools.chosen.name == PlaceTool.name:
-            bring_into_view(self.place_panel)
+        name = self.tools.chosen.name
+        # It has something to say only while there are groups to choose from.
+        self.floaters_section.setVisible(name == FloatersTool.name)
+        if name in (PlaceTool.name, FloatersTool.name):
+            bring_into_view(self.place_panel if name == PlaceTool.name else self.floaters_panel)
 
     def _show_display(self) -> None:
         options = self.display.options

@@ -234,6 +234,19 @@ class Viewport:
         actor = self.splats.shown
         return inside if actor is None else visible_only(actor, self.projection, screen, inside)
 
+    def sight(self) -> Callable[[FileMask], FileMask]:
+        """What tells, on any thread, which of some splats (N,) bool are in the picture as it is, and not hidden."""
+        actor, projection = self.splats.shown, self.projection
+
+        def seen(mask: FileMask) -> FileMask:
+            if actor is None:
+                return mask
+            screen = screen_points(actor, projection)
+            inside = mask & in_rectangle(screen, 0, 0, projection.width, projection.height)
+            return visible_only(actor, projection, screen, inside)
+
+        return seen
+
     # Marks --------------------------------------------------------------------------------------------------------
 
     def show_disc(self, rows: ArrayLike | None) -> None:

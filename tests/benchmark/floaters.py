@@ -17,12 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from splap_editor.core.splats.floater_evidence import EVIDENCE
-from splap_editor.core.splats.floaters import Floaters
+from splap_editor.core.splats.floater_evidence import EVIDENCE, floater_evidence
+from splap_editor.core.splats.floaters import Floaters, floaters
 from splap_editor.core.splats.main_subject import main_subject
 from splap_editor.core.splats.occupancy import Ellipses, occupancy_ellipses
 from splap_editor.core.splats.splats import Splats
-from splap_editor.engine.floaters import scene_floaters
 from splap_editor.io.ply import read_ply
 from splap_editor.io.sample_maker import STYLES, shape_sample, surface_splats
 from splap_editor.resources import resource
@@ -103,7 +102,7 @@ def _logit(opacity):
 def found_in(splats: Splats) -> tuple[Ellipses, Floaters]:
     """Floaters of a scene."""
     ellipses = occupancy_ellipses(splats)
-    return ellipses, scene_floaters(splats, ellipses)
+    return ellipses, floaters(splats, ellipses)
 
 
 def clean_object(name: str) -> Splats:
@@ -165,8 +164,8 @@ def main() -> None:
     if options.fit:
         scenes = []
         for _, _, splats, is_floater in made_scenes(FITTED, None):
-            ellipses, found = found_in(splats)
-            scenes.append((found.evidence, is_floater[ellipses.rows]))
+            ellipses = occupancy_ellipses(splats)
+            scenes.append((floater_evidence(splats, ellipses)[0], is_floater[ellipses.rows]))
         _tell_model(*fitted_model(scenes))
         return
     known = defaultdict(list)

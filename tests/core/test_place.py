@@ -9,7 +9,7 @@ from splap_editor.core.place import (
     Place,
     file_points,
     fitted_plane,
-    levelled,
+    laid_level,
     placed_points,
     placed_pose,
     placed_splats,
@@ -88,7 +88,7 @@ def test_a_floor_is_level_whatever_side_its_normal_points_to():
     floor = np.column_stack([rng.normal(size=(30, 2)), np.zeros(30)])
     for side in (1.0, -1.0):
         tilted, above = floor @ M[:3, :3].T + M[:3, 3], M[:3, :3] @ [0.0, 0.0, side] + M[:3, 3]
-        place = levelled(Place(), tilted, np.array([0.0, 0.0, 2.0]), above)
+        place = laid_level(Place(), *fitted_plane(tilted), np.array([0.0, 0.0, 2.0]), above)
         down = placed_points(tilted, place)
         assert np.ptp(down[:, 2]) < 1e-9
         assert placed_points(above[None], place)[0, 2] > down[0, 2]

@@ -6,8 +6,10 @@ import numpy as np
 
 from splap_editor.core.progress import Cancelled
 from splap_editor.core.removal import PickedFloaters, RemovalStep
+from splap_editor.core.splats.floater_evidence import REASONS
 from splap_editor.engine.floaters import floating_rows
-from splap_editor.engine.removal import Removal
+from splap_editor.engine.removal import Removal, removal_of
+from splap_editor.resources import resource
 from splap_editor.session.floater_search import floater_search
 from splap_editor.tools.floaters_tool import FloaterOptions
 
@@ -34,10 +36,11 @@ def test_the_window_finds_what_a_recipe_finds(hand):
     found = search.found(strength)
     np.testing.assert_array_equal(found.mask, floating_rows(scene.splats, None, strength))
     assert 0 < len(found.rows) < scene.splats.n_splats
-    sizes = [len(found.rows_of(label)) for label in found.groups]
-    assert sizes == sorted(sizes, reverse=True) and sum(sizes) == len(found.rows)
+    sizes = [len(found.rows_of(group)) for group in range(found.n_groups)]
+    assert sizes == sorted(sizes, reverse=True) == list(found.sizes) and sum(sizes) == len(found.rows)
     assert found.group_of(int(found.rows[0])) == found.labels[0]
-    removed = search.removal(strength)
+    assert all(found.reason(group) in REASONS for group in range(found.n_groups))
+    removed = search.removal(found)
     again = floater_search(scene.splats, removed)
     assert not again.found(0.0).mask.any()
     assert again.ellipses.n_nodes == scene.ellipses.n_nodes - len(found.rows)
@@ -54,21 +57,79 @@ def test_what_floats_is_tinted_and_return_takes_it_in_one_step(hand):
     assert hand.key("Return")
     np.testing.assert_array_equal(hand.scene.removed, mask)
     assert hand.scene.edit.removal.steps == (RemovalStep(PickedFloaters(strength)),)
-    assert painted[-1] is None and tool.search is None
+    assert painted[-1] is None and tool.found is None
     hand.session.history.undo()
     assert hand.scene.edit.removed is None
 
 
-def test_strength_changes_the_preview_at_once_and_brackets_frame_each_group(hand):
+def test_strength_changes_the_preview_and_brackets_frame_each_group(hand):
     tool = looked_for(hand, some_strength(hand))
-    views = []
+    views, n = [], tool.found.n_groups
     hand.context.fly_to = views.append
-    assert hand.key("]") and hand.key("[")
+    assert hand.key("]") and tool.looked_at == 0
+    assert hand.key("[") and tool.looked_at == n - 1
     assert len(views) == 2
-    search = tool.search
+    search = tool.preview._search
     hand.context.held(FloaterOptions).set(FloaterOptions(0.0))
-    assert tool.search is search and not len(tool.found.rows)
+    hand.main.run_until(lambda: not len(tool.found.rows))
+    assert tool.preview._search is search
     assert "Nothing floats" in hand.context.hud.text and not hand.key("]")
+
+
+def test_a_group_that_is_kept_stays_and_the_recipe_says_so(hand):
+    painted = []
+    hand.context.paint = painted.append
+    strength = some_strength(hand)
+    tool = looked_for(hand, strength)
+    found, rows = tool.found, tool.found.rows_of(0)
+    tool.preview.keep(0, True)
+    assert tool.preview.keeps(0) and (found.n_groups == 1 or not tool.preview.keeps(1))
+    assert not painted[-1][rows, 3].any()
+    expected = found.mask
+    expected[rows] = False
+    assert hand.key("Return")
+    np.testing.assert_array_equal(hand.scene.removed, expected)
+    removal = hand.scene.edit.removal
+    np.testing.assert_array_equal(removal_of(removal.steps, hand.scene.splats).mask, expected)
+    assert [step.restores for step in removal.steps] == [False, True]
+
+
+def test_a_group_can_go_after_all_and_what_stays_stays_at_other_strengths(hand):
+    tool = looked_for(hand, some_strength(hand))
+    kept, found = tool.found.rows_of(0), tool.found
+    tool.preview.keep(0, True)
+    hand.context.held(FloaterOptions).set(FloaterOptions(0.9999999))
+    hand.main.run_until(lambda: tool.found is not found)
+    assert tool.found.mask[kept].all() and not tool.preview.goes[kept].any()
+    group = tool.found.group_of(int(kept[0]))
+    tool.preview.keep(group, False)
+    assert tool.preview.goes[kept].all()
+
+
+def test_escape_leaves_everything_as_it_is_until_the_next_click(hand):
+    painted = []
+    hand.context.paint = painted.append
+    tool = looked_for(hand, some_strength(hand))
+    edit = hand.scene.edit
+    assert hand.key("Esc")
+    assert painted[-1] is None and not hand.context.hud.text and tool.found is None
+    assert hand.scene.edit is edit and not hand.session.history.can_undo
+    hand.hover((8, 8))
+    assert not tool.preview.is_shown
+    hand.click((8, 8))
+    hand.main.run_until(lambda: tool.found is not None)
+
+
+def test_a_large_scene_is_looked_through_ahead_and_the_search_outlives_the_tool(hand, monkeypatch):
+    monkeypatch.setattr("splap_editor.session.floater_preview.AHEAD_SPLATS", 10)
+    tool = hand.tools.tools["floaters"]
+    hand.session.open(resource("samples", "tube.ply"))
+    hand.main.run_until(lambda: tool.preview._search is not None)
+    search = tool.preview._search
+    assert tool.found is None and not hand.context.hud.text
+    looked_for(hand, 0.5)
+    hand.tools.choose("handle")
+    assert tool.preview._search is search and tool.found is None
 
 
 def test_another_tool_takes_the_tint_away(hand):
@@ -89,7 +150,7 @@ def test_it_says_how_far_it_is(hand):
 def test_another_tool_stops_the_looking(hand, monkeypatch):
     begun, go_on, ended = threading.Event(), threading.Event(), []
 
-    def slow(splats, removal, *, stages):
+    def slow(splats, removal, ellipses, *, stages, run):
         begun.set()
         go_on.wait(60.0)
         try:
@@ -98,11 +159,11 @@ def test_another_tool_stops_the_looking(hand, monkeypatch):
             ended.append("cancelled")
             raise
 
-    monkeypatch.setattr("splap_editor.tools.floaters_tool.floater_search", slow)
+    monkeypatch.setattr("splap_editor.session.floater_preview.floater_search", slow)
     hand.tools.choose("floaters")
     tool = hand.tools.chosen
     assert begun.wait(60.0)
     hand.tools.choose("handle")
     go_on.set()
-    hand.main.run_until(lambda: not tool._job.is_busy)
-    assert ended == ["cancelled"] and tool.search is None
+    hand.main.run_until(lambda: not tool.preview._searches.is_busy)
+    assert ended == ["cancelled"] and tool.found is None

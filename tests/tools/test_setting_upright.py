@@ -83,15 +83,30 @@ def test_handles_keep_their_gizmo_with_other_tools_and_their_poses_with_any_plac
     np.testing.assert_allclose(hand.scene.edit.place.rotation @ moved, [0.2, 0.0, 0.0], atol=1e-9)
 
 
+def find_floor(hand):
+    hand.click(hand.surface())
+    assert "Looking for the floor" in hand.context.hud.text and hand.scene.preview is None
+    hand.main.run_until(lambda: hand.scene.preview is not None)
+
+
+def test_a_floor_that_was_left_before_it_was_found_is_not_shown(hand):
+    turned(hand)
+    tool = taken_up(hand, "level")
+    hand.click(hand.surface())
+    assert hand.key("Esc") and not hand.context.hud.text
+    hand.main.run_until(lambda: not tool._job.is_busy)
+    assert hand.scene.preview is None and not hand.key("Return")
+
+
 def test_a_click_levels_by_what_is_about_it_and_return_keeps_it(hand):
     turned(hand)
     before, tool = hand.scene.edit.place, taken_up(hand, "level")
-    hand.click(hand.surface())
+    find_floor(hand)
     shown = hand.scene.preview.place
     assert shown != before and "off level" in hand.context.hud.text
     hand.key("Esc")
     assert hand.scene.preview is None and hand.scene.edit.place == before and not hand.context.hud.text
-    hand.click(hand.surface())
+    find_floor(hand)
     hand.key("Return")
     np.testing.assert_allclose(hand.scene.edit.place.matrix, shown.matrix, atol=1e-12)
     assert hand.session.history.undo_label == "Level object" and not tool.points

@@ -221,6 +221,7 @@ def ready_for(driver, name, row, text):
         driver.window.view.viewport.reset_camera()
         at, ratio = driver.surface_pixel(), driver.window.viewport.devicePixelRatioF()
         window_tool(driver, name).fit(PointerEvent("press", (at.x() * ratio, at.y() * ratio)))
+        driver.qtbot.waitUntil(lambda: driver.scene.preview is not None, timeout=60_000)
     elif name == "measure":
         measure = window_tool(driver, name)
         for row in driver.scene.ellipses.rows[[0, -1]]:
@@ -229,10 +230,10 @@ def ready_for(driver, name, row, text):
             driver.key(Qt.Key.Key_5)
     elif name == "floaters":
         finder = window_tool(driver, name)
-        finder.ask()
-        driver.qtbot.waitUntil(lambda: finder.search is not None, timeout=60_000)
-        likelihoods = np.sort(finder.search.floaters.likelihoods)
-        context.held(FloaterOptions).set(FloaterOptions(float(np.clip(1.0 - likelihoods[-30], 0.01, 0.99))))
+        context.held(FloaterOptions).set(FloaterOptions(0.99))
+        finder.begin()
+        driver.qtbot.waitUntil(lambda: finder.found is not None and finder.found.strength == 0.99, timeout=60_000)
+        assert finder.found.n_groups
         driver.qtbot.waitUntil(lambda: not driver.window.view.viewport.is_moving, timeout=WAIT_MS)
     elif name in ("separate", "join") and text in ("Return", "Enter"):
         # With nothing pointed at, it is about the selection and the rest.

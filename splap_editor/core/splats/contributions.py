@@ -1,12 +1,13 @@
 """What each splat contributes to pictures of the scene from all around."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.progress import Progress, no_progress
+from splap_editor.core.progress import Progress, Runner, in_turn, no_progress
 from splap_editor.core.splats.main_subject import MainSubject
 from splap_editor.core.splats.occupancy import Ellipses
 from splap_editor.core.splats.rotations import quats_to_matrices
@@ -17,6 +18,12 @@ _SIDES = (128, 512)
 a splat has about as many pixels in every scene and the time is linear in their number."""
 
 _WIDTH_PER_ROOT = 0.4
+
+_MANY = 200_000
+"""More splats than these are looked at from the corners of a cube alone: each is small and seen well from some."""
+
+_CUBE = 4
+"""So many of the directions are a cube's."""
 
 _BLUR = 0.3
 """Variance in squared pixels added to every projected splat, so that none falls between the pixels. It is dimmed by as
@@ -55,11 +62,19 @@ class Contributions:
     peaks: NDArray[np.float64]
 
 
-def contributions(splats: Splats, ellipses: Ellipses, *, progress: Progress = no_progress) -> Contributions:
-    """Sum up what each active splat contributes to twenty pictures of the scene from all around.
+def contributions(
+    splats: Splats,
+    ellipses: Ellipses,
+    *,
+    subject: MainSubject | None = None,
+    progress: Progress = no_progress,
+    run: Runner = in_turn,
+) -> Contributions:
+    """Sum up what each active splat contributes to pictures of the scene from all around.
 
-    The corners of a dodecahedron in the frame of the main subject's box give the directions. Each picture is a parallel
-    projection, alpha-composited from front to back [1]_ [2]_, of the splats in and about that box.
+    The twenty corners of a dodecahedron in the frame of the main subject's box give the directions; of very many
+    splats, the eight corners of a cube. Each picture is a parallel projection, alpha-composited from front to back
+    [1]_ [2]_, of the splats in and about that box.
 
     Parameters
     ----------
@@ -67,8 +82,12 @@ def contributions(splats: Splats, ellipses: Ellipses, *, progress: Progress = no
         The scene.
     ellipses : Ellipses
         Its n active splats.
+    subject : MainSubject, optional
+        What the pictures are of; without, the subject of the ellipses. Its size is positive.
     progress : Progress
         Called with the share done.
+    run : Runner
+        Runs the pictures of each direction; what comes out does not depend on how.
 
     Returns
     -------
@@ -83,7 +102,7 @@ def contributions(splats: Splats, ellipses: Ellipses, *, progress: Progress = no
     """
     n = ellipses.n_nodes
     weights, peaks = np.zeros(n), np.zeros(n)
-    subject = ellipses.subject
+    subject = subject or ellipses.subject
     shown = np.flatnonzero(subject.holds(ellipses.centers, room=_ROOM * subject.size))
     if not len(shown):
         return Contributions(weights, peaks)
@@ -93,18 +112,29 @@ def contributions(splats: Splats, ellipses: Ellipses, *, progress: Progress = no
     axes = np.ascontiguousarray((axes * splats.scales[rows][:, None, :]).swapaxes(1, 2))
     opacities, squares = np.ascontiguousarray(splats.opacities[rows]), np.minimum(ellipses.cutoffs[shown] ** 2, _REACH)
     views, extents = _views(subject)
+    if len(shown) > _MANY:
+        views, extents = views[:_CUBE], extents[:_CUBE]
     width = float(np.clip(_WIDTH_PER_ROOT * np.sqrt(len(shown)), *_SIDES))
     pixel = 2.0 * float(extents.max()) / width
     trained_blur = _BLUR * min(1.0, subject.size / _TRAINED_WIDTH / pixel) ** 2
-    found, highest = np.zeros(len(shown)), np.zeros(len(shown))
-    for k, (view, extent) in enumerate(zip(views, extents, strict=True)):
+
+    def pictures(
+        view: NDArray[np.float64], extent: NDArray[np.float64], progress: Progress
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        found, highest = np.zeros(len(shown)), np.zeros(len(shown))
         order = np.argsort(points @ view[2], kind="stable").astype(np.int32)
         columns, lines = np.ceil(2.0 * extent / pixel).astype(int)
         # From behind, the same pixels are filled in the opposite order.
         for places in (order, order[::-1].copy()):
+            progress(0.0 if places is order else 0.5)
             light = np.ones((lines, columns))
             _composite(places, view / pixel, points, axes, opacities, squares, trained_blur, light, found, highest)
-        progress((k + 1) / len(views))
+        return found, highest
+
+    parts = [partial(pictures, view, extent) for view, extent in zip(views, extents, strict=True)]
+    pairs = run(parts, lambda shares: progress(sum(shares) / len(parts)))
+    progress(1.0)
+    found, highest = sum(pair[0] for pair in pairs), np.maximum.reduce([pair[1] for pair in pairs])
     weights[shown] = found * (pixel / subject.size) ** 2 / (2 * len(views))
     peaks[shown] = highest
     return Contributions(weights, peaks)

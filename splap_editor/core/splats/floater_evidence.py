@@ -1,24 +1,17 @@
-"""What is known of each splat that may float: its neighbours, what hangs together with it, and what it shows.
-
-Everything is measured in the splat's own spacing and size, or its neighbours': captures are not equally dense.
-"""
+"""What is known of each splat that may float: its neighbours, what hangs together with it, and what it shows."""
 
 import numba as nb
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from splap_editor.core.progress import Progress, no_progress, part_of
-from splap_editor.core.splats.contributions import Contributions
+from splap_editor.core.progress import Runner, StageProgress, in_turn, part_of, silent
+from splap_editor.core.splats.contributions import Contributions, contributions
 from splap_editor.core.splats.main_subject import MainSubject
 from splap_editor.core.splats.occupancy import Ellipses
-
-N_NEAREST = 8
-"""Neighbours in space that a splat is compared with."""
-
-_BLOCK_NODES = 1 << 16
+from splap_editor.core.splats.smallest_box import smallest_box
+from splap_editor.core.splats.splats import Splats
+from splap_editor.core.splats.surroundings import LOCAL, Surroundings, Ties, bounded_logits, surroundings
 
 _FAINT = 0.3
 """Share of its neighbours' usual opacity from which a splat is solid: haze ties nothing together."""
@@ -26,88 +19,25 @@ _FAINT = 0.3
 _BODY = 0.02
 """Share of the splats, or of what the pictures show, from which what hangs together belongs to the body."""
 
-_THICKNESS = 0.1
-"""How far a splat reaches out of its plane, in units of its larger semi-axis."""
+_NEAR = 1.0
+"""The body is looked for no farther from the subject's box than so many times its size."""
 
-_STRAY = (1.0, 2.5)
-"""Neighbours hang together if they lie no farther apart than so many times the spacing about either: a narrow measure
-that haze over a surface does not meet, and a wide one for where the density of a surface changes."""
+_SAMPLE = 40_000
+"""So many splats tell how far the body reaches."""
 
-LOCAL = ("spacing", "own spacing", "mutual", "out of plane", "own plane", "aligned", "size", "opacity", "contacts")
-"""Of a splat among its nearest, in this order:
+REASONS = {
+    "few splats about it": ("spacing", "own spacing", "mutual", "piece mutual", "piece spacing"),
+    "of no surface": ("out of plane", "own plane", "aligned", "piece aligned", "piece out of plane"),
+    "of another size": ("size",),
+    "faint": ("opacity", "logit", "piece logit"),
+    "hardly seen": ("contribution", "shown share", "peak"),
+    "a small piece": ("contacts", "narrow count", "narrow shown", "wide count", "wide shown"),
+    "apart from the rest": ("beyond", "narrow gap", "narrow distance", "wide gap", "wide distance"),
+}
+"""In words what gives a floater away, and the `EVIDENCE` that says it."""
 
-- the distance of the farthest: against theirs, and against the splat's own size (logarithms);
-- the share of them that count the splat among their own nearest;
-- how far the splat lies out of their planes, and they out of its plane (mean sines);
-- how far normals agree (mean cosine);
-- its size and its opacity against theirs (differences of logarithms, and of logits);
-- the share of them that the splat touches.
-"""
-
-
-def nearest(
-    centers: NDArray[np.float64], progress: Progress = no_progress
-) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """(n, k) nearest nodes of each, itself left out, and (n, k) their distances, ascending; k is 8 or n − 1."""
-    n = len(centers)
-    k = min(N_NEAREST, n - 1)
-    neighbors, distances = np.empty((n, k), np.int32), np.empty((n, k))
-    tree = cKDTree(centers, balanced_tree=False)
-    for lo in range(0, n, _BLOCK_NODES):
-        some = slice(lo, lo + _BLOCK_NODES)
-        found, at = tree.query(centers[some], k + 1)
-        found, at = found.reshape(-1, k + 1), at.reshape(-1, k + 1)
-        # Of centres that coincide, the splat itself need not be the first.
-        own = at == np.arange(lo, lo + len(at))[:, None]
-        own[~own.any(axis=1), -1] = True
-        neighbors[some], distances[some] = at[~own].reshape(-1, k), found[~own].reshape(-1, k)
-        progress(min(1.0, (lo + _BLOCK_NODES) / n))
-    return neighbors, distances
-
-
-@nb.njit(nogil=True, cache=True, error_model="numpy")
-def _local(neighbors, distances, centers, semi_axes, normals, reaches, logits, stray, found, ties):
-    """Fill `LOCAL` (n, 9), and for each measure of straying whether a neighbour is tied to the splat (n, k)."""
-    n, k = neighbors.shape
-    for i in range(n):
-        spacing, own = distances[i, k - 1], reaches[i]
-        spacings = mutual = out = flat = aligned = sizes = opacities = contacts = 0.0
-        for c in range(k):
-            j = neighbors[i, c]
-            d = distances[i, c]
-            other = distances[j, k - 1]
-            spacings += np.log(max(other, 1e-6 * own))
-            sizes += np.log(reaches[j])
-            opacities += logits[j]
-            mutual += d <= other
-            along_i = along_j = across_i = across_j = over_i = over_j = agree = 0.0
-            for a in range(3):
-                step = centers[j, a] - centers[i, a]
-                along_i += semi_axes[i, 0, a] * step
-                across_i += semi_axes[i, 1, a] * step
-                over_i += normals[i, a] * step
-                along_j += semi_axes[j, 0, a] * step
-                across_j += semi_axes[j, 1, a] * step
-                over_j += normals[j, a] * step
-                agree += normals[i, a] * normals[j, a]
-            aligned += abs(agree)
-            if d > 0.0:
-                out += abs(over_j) / d
-                flat += abs(over_i) / d
-                reach = np.sqrt(along_i * along_i + across_i * across_i + (_THICKNESS * own * d) ** 2)
-                reach += np.sqrt(along_j * along_j + across_j * across_j + (_THICKNESS * reaches[j] * d) ** 2)
-                touches = d * d <= reach
-            else:
-                touches = True
-            contacts += touches
-            least = min(spacing, other)
-            for m in range(2):
-                ties[m, i, c] = touches and d <= stray[m] * least
-        found[i, 0] = np.log(max(spacing, 1e-6 * own)) - spacings / k
-        found[i, 1] = np.log(max(spacing, 1e-6 * own) / own)
-        found[i, 2], found[i, 3], found[i, 4], found[i, 5] = mutual / k, out / k, flat / k, aligned / k
-        found[i, 6], found[i, 7], found[i, 8] = np.log(own) - sizes / k, logits[i] - opacities / k, contacts / k
-
+_BOUNDS = ((0, -2.0, 3.0), (1, -3.0, 3.5), (6, -3.0, 3.0), (7, -6.0, 6.0))
+"""Columns of `LOCAL`, and between what each is kept."""
 
 EVIDENCE = (
     *LOCAL,
@@ -129,62 +59,90 @@ EVIDENCE = (
 
 
 def floater_evidence(
-    ellipses: Ellipses, contributions: Contributions, *, progress: Progress = no_progress
-) -> tuple[NDArray[np.float64], sparse.csr_array]:
+    splats: Splats, ellipses: Ellipses, *, stages: StageProgress = silent, run: Runner = in_turn
+) -> tuple[NDArray[np.float32], Ties]:
     """Look at each splat, its neighbours and its piece; neither the scene's units nor the order of nodes matter.
 
     Parameters
     ----------
+    splats : Splats
+        The scene.
     ellipses : Ellipses
-        The n active splats of a scene.
-    contributions : Contributions
-        Of the nodes.
-    progress : Progress
-        Called with the share done.
+        Its n active splats.
+    stages : callable
+        ``stages(name)`` gives the progress callback of a stage.
+    run : Runner
+        Runs parts of the splats, and pictures.
 
     Returns
     -------
-    evidence : (n, 27) float64
+    evidence : (n, 27) float32
         The `EVIDENCE` of each node.
-    touching : (n, n) csr_array of bool
-        Which of its nearest a node hangs together with by the wide measure, solid or not; not symmetric.
+    ties : Ties
+        What hangs together by the wide measure.
     """
     n = ellipses.n_nodes
     if n < 2:
-        return np.zeros((n, len(EVIDENCE))), sparse.csr_array((n, n), dtype=np.bool_)
-    centers, subject = ellipses.centers, ellipses.subject
-    neighbors, distances = nearest(centers, part_of(progress, 0.0, 0.6))
-    opacities = np.clip(ellipses.opacities, 1e-3, 1.0 - 1e-3)
-    logits = np.log(opacities / (1.0 - opacities))
-    reaches = np.maximum(ellipses.reaches, 1e-12 * subject.size)
-    local, ties = np.empty((n, len(LOCAL))), np.zeros((len(_STRAY), *neighbors.shape), np.bool_)
-    args = (neighbors, distances, centers, ellipses.semi_axes, ellipses.normals, reaches, logits)
-    _local(*args, np.array(_STRAY), local, ties)
-    progress(0.7)
-    weights = contributions.weights / max(contributions.weights.sum(), 1e-300)
+        return np.zeros((n, len(EVIDENCE)), np.float32), Ties(np.empty((n, 0), np.int32), np.empty((n, 0), np.bool_))
+    progress = stages("floaters")
+    around = surroundings(ellipses, progress=part_of(progress, 0.0, 0.7), run=run)
+    logs = np.log(np.maximum(ellipses.opacities, 1e-3))
+    is_solid = logs >= np.log(_FAINT) + logs[around.neighbors].mean(axis=1)
+    pieces = [ties.pieces(is_solid) for ties in (around.narrow, around.wide)]
+    subject = _whole_subject(ellipses, pieces[-1])
+    shown = contributions(splats, ellipses, subject=subject, progress=stages("contributions"), run=run)
+    progress(0.8)
+    return _columns(ellipses, around, pieces, subject, shown), around.wide
+
+
+def _whole_subject(ellipses: Ellipses, labels: NDArray[np.int32]) -> MainSubject:
+    """A box about all of the body that lies in the subject's box or about it: sparse halves of an object too."""
+    subject, counts = ellipses.subject, np.bincount(labels)
+    is_body = (counts >= _BODY * len(labels))[labels]
+    is_body &= subject.holds(ellipses.centers, room=_NEAR * subject.size)
+    body = ellipses.centers[is_body]
+    if not len(body):
+        return subject
+    # Every one of so many along the curve: the sample is as dense everywhere as the body is.
+    center, half_axes = smallest_box(body[:: -(-len(body) // _SAMPLE)])
+    size = 2.0 * float(np.linalg.norm(half_axes[0]))
+    return MainSubject(size, center, half_axes) if size > 0.0 else subject
+
+
+def _columns(
+    ellipses: Ellipses,
+    around: Surroundings,
+    pieces: list[NDArray[np.int32]],
+    subject: MainSubject,
+    shown: Contributions,
+) -> NDArray[np.float32]:
+    """(n, 27) the evidence."""
+    n, logits = ellipses.n_nodes, bounded_logits(ellipses)
+    weights = shown.weights / max(shown.weights.sum(), 1e-300)
     minor = np.sqrt(np.einsum("ij,ij->i", ellipses.semi_axes[:, 1], ellipses.semi_axes[:, 1]))
+    opacities = 1.0 / (1.0 + np.exp(-logits))
     areas = np.maximum(ellipses.reaches * minor / subject.size**2, 1e-30) * opacities
-    of_pieces = []
-    is_solid = np.log(opacities) >= np.log(_FAINT) + np.log(opacities)[neighbors].mean(axis=1)
-    for tied in ties:
-        pairs = tied & is_solid[:, None] & is_solid[neighbors]
-        labels = connected_components(_ties(pairs, neighbors), directed=False)[1]
-        of_pieces.append(_piece_evidence(labels, centers, distances[:, -1], weights, subject.size))
-        progress(0.7 + 0.15 * len(of_pieces))
-    counts = np.bincount(labels)
-    means = [np.bincount(labels, column) / counts for column in (*local.T[[2, 5, 3]], logits, local[:, 1])]
-    bounds = ((0, -2.0, 3.0), (1, -3.0, 3.5), (6, -3.0, 3.0), (7, -6.0, 6.0))
-    for column, least, most in bounds:
-        np.clip(local[:, column], least, most, out=local[:, column])
-    alone = (
+    evidence = np.empty((n, len(EVIDENCE)), np.float32)
+    evidence[:, : len(LOCAL)] = around.local
+    for column, least, most in _BOUNDS:
+        np.clip(evidence[:, column], least, most, out=evidence[:, column])
+    columns = [
         logits,
         np.log(np.clip(weights * n, 1e-3, 30.0)),
-        np.log(np.clip(contributions.weights / areas, 1e-3, 10.0)),
-        contributions.peaks,
-        np.clip(_beyond(subject, centers) / subject.size, 0.0, 0.5),
-    )
-    evidence = np.column_stack([local, *alone, *of_pieces, *(mean[labels] for mean in means)])
-    return evidence, _ties(ties[-1], neighbors)
+        np.log(np.clip(shown.weights / areas, 1e-3, 10.0)),
+        shown.peaks,
+        np.clip(_beyond(subject, ellipses.centers) / subject.size, 0.0, 0.5),
+    ]
+    for labels in pieces:
+        columns += [
+            column[labels] for column in _piece_evidence(labels, around, ellipses.centers, weights, subject.size)
+        ]
+    labels, counts = pieces[-1], np.bincount(pieces[-1])
+    for column in (*around.local.T[[2, 5, 3]], logits, around.local[:, 1]):
+        columns.append((np.bincount(labels, column) / counts)[labels])
+    for at, column in enumerate(columns, start=len(LOCAL)):
+        evidence[:, at] = column
+    return evidence
 
 
 def _beyond(subject: MainSubject, centers: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -197,38 +155,54 @@ def _beyond(subject: MainSubject, centers: NDArray[np.float64]) -> NDArray[np.fl
     return beyond
 
 
-def _ties(tied: NDArray[np.bool_], neighbors: NDArray[np.int32]) -> sparse.csr_array:
-    """(n, n) where a splat is tied (n, k) to one of its neighbours."""
-    n = len(neighbors)
-    starts = np.concatenate([[0], np.cumsum(tied.sum(axis=1))])
-    return sparse.csr_array((np.ones(starts[-1], np.bool_), neighbors[tied], starts), shape=(n, n))
-
-
 def _piece_evidence(
     labels: NDArray[np.integer],
+    around: Surroundings,
     centers: NDArray[np.float64],
-    spacings: NDArray[np.float64],
     weights: NDArray[np.float64],
     size: float,
-) -> NDArray[np.float64]:
-    """(n, 4) count, shown, gap and distance of each splat's piece."""
-    n = len(labels)
+) -> tuple[NDArray[np.float64], ...]:
+    """Count, shown, gap and distance of each piece, (p,) each.
+
+    How near a piece comes to the body is looked at where a splat of it has the body among its nearest, and nowhere but
+    in a piece without such splats by a search.
+    """
+    n, spacings = len(labels), around.distances[:, -1]
     counts, shown = np.bincount(labels), np.bincount(labels, weights)
     is_body = (counts >= _BODY * n) | (shown >= _BODY)
     if not is_body.any():
         is_body = counts == counts.max()
-    body, rest = np.flatnonzero(is_body[labels]), np.flatnonzero(~is_body[labels])
-    gaps, ways = np.zeros(len(counts)), np.zeros(len(counts))
-    gaps[~is_body] = ways[~is_body] = np.inf
+    gaps, ways = np.full((2, len(counts)), np.inf)
+    gaps[is_body] = ways[is_body] = 0.0
+    least = 1e-12 * size
+    _near_body(labels, around.neighbors, around.distances, is_body, least, gaps, ways)
+    rest = np.flatnonzero(np.isinf(ways)[labels])
     if len(rest):
+        body = np.flatnonzero(is_body[labels])
         found, at = cKDTree(centers[body], balanced_tree=False).query(centers[rest])
-        unit = np.maximum(np.maximum(spacings[rest], spacings[body[at]]), 1e-12 * size)
+        unit = np.maximum(np.maximum(spacings[rest], spacings[body[at]]), least)
         np.minimum.at(gaps, labels[rest], found / unit)
         np.minimum.at(ways, labels[rest], found)
-    columns = (
+    return (
         np.log10(np.clip(counts / n, 1e-4, _BODY)),
         np.log10(np.clip(shown, 1e-5, _BODY)),
         np.log(np.clip(gaps, 0.1, 30.0)),
         np.log(np.clip(ways / size, 1e-3, 1.0)),
     )
-    return np.column_stack(columns)[labels]
+
+
+@nb.njit(nogil=True, cache=True, error_model="numpy")
+def _near_body(labels, neighbors, distances, is_body, least, gaps, ways):
+    """Lower each piece's gap and way to the body by what its splats have among their nearest."""
+    n, k = neighbors.shape
+    for i in range(n):
+        piece = labels[i]
+        if is_body[piece]:
+            continue
+        for c in range(k):
+            j = neighbors[i, c]
+            if is_body[labels[j]]:
+                unit = max(distances[i, k - 1], distances[j, k - 1], least)
+                gaps[piece] = min(gaps[piece], distances[i, c] / unit)
+                ways[piece] = min(ways[piece], distances[i, c])
+                break

@@ -4,18 +4,21 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
-from splap_editor.core.progress import Progress, no_progress
-from splap_editor.core.splats.contributions import Contributions
-from splap_editor.core.splats.floater_evidence import floater_evidence
+from splap_editor.core.progress import Runner, StageProgress, in_turn, silent
+from splap_editor.core.splats.floater_evidence import EVIDENCE, REASONS, floater_evidence
 from splap_editor.core.splats.floater_weights import CENTERS, SPREADS, WEIGHTS
 from splap_editor.core.splats.occupancy import Ellipses
+from splap_editor.core.splats.splats import Splats
+from splap_editor.core.splats.surroundings import Ties
 
 _FARTHEST = 3.0
 """Evidence counts no more than this many spreads from its usual value, so that nothing unheard of decides alone."""
 
 _BLOCK_NODES = 1 << 14
+
+_SAYS = np.array([[name in names for names in REASONS.values()] for name in EVIDENCE], np.float64)
+"""(27, 7) which evidence says which reason."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,53 +27,59 @@ class Floaters:
 
     Parameters
     ----------
-    evidence : (n, 27) float64
-        `splap_editor.core.splats.floater_evidence.EVIDENCE` of each node.
     likelihoods : (n,) float64
         In (0, 1).
-    touching : (n, n) csr_array of bool
-        Which of its nearest a splat hangs together with; not symmetric.
+    reasons : (n,) int8
+        Which of the `splap_editor.core.splats.floater_evidence.REASONS` says most that it floats.
+    ties : Ties
+        What hangs together.
     """
 
-    evidence: NDArray[np.float64]
     likelihoods: NDArray[np.float64]
-    touching: sparse.csr_array
+    reasons: NDArray[np.int8]
+    ties: Ties
 
     def at(self, strength: float) -> NDArray[np.bool_]:
         """(n,) what floats at a strength in [0, 1): at 0 nothing, at ½ what rather does than not."""
         return self.likelihoods > 1.0 - strength
 
 
-def floaters(ellipses: Ellipses, contributions: Contributions, *, progress: Progress = no_progress) -> Floaters:
+def floaters(splats: Splats, ellipses: Ellipses, *, stages: StageProgress = silent, run: Runner = in_turn) -> Floaters:
     """Weigh the evidence that splats float.
 
     Parameters
     ----------
+    splats : Splats
+        The scene.
     ellipses : Ellipses
-        The n active splats of a scene.
-    contributions : Contributions
-        Of the nodes.
-    progress : Progress
-        Called with the share done.
+        Its n active splats.
+    stages : callable
+        ``stages(name)`` gives the progress callback of a stage.
+    run : Runner
+        Runs parts of the splats, and pictures; what is found does not depend on how.
 
     Returns
     -------
     Floaters
         By a logistic model of the evidences, their squares and products. Turning, moving, scaling or shuffling the
-        scene changes it no more than it changes the contributions.
+        scene changes no more than pixels at the rims of splats.
     """
-    found, touching = floater_evidence(ellipses, contributions, progress=progress)
-    weights, margins = np.array(WEIGHTS), np.empty(len(found))
-    # Block by block: all products of all splats at once would be gigabytes.
-    for lo in range(0, len(found), _BLOCK_NODES):
+    evidence, ties = floater_evidence(splats, ellipses, stages=stages, run=run)
+    margins, reasons = np.empty(len(evidence)), np.empty(len(evidence), np.int8)
+    # Block by block, so that what is worked on stays in the cache.
+    for lo in range(0, len(evidence), _BLOCK_NODES):
         some = slice(lo, lo + _BLOCK_NODES)
-        margins[some] = model_terms(found[some]) @ weights
+        shares = _shares(evidence[some])
+        margins[some] = WEIGHTS[0] + shares.sum(axis=1)
+        reasons[some] = np.argmax(shares @ _SAYS, axis=1)
     with np.errstate(over="ignore"):
-        return Floaters(found, 1.0 / (1.0 + np.exp(-margins)), touching)
+        return Floaters(1.0 / (1.0 + np.exp(-margins)), reasons, ties)
 
 
-def model_terms(evidence: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n, 406) what the model weighs: 1, each evidence, and the product of every two."""
+def _shares(evidence: NDArray[np.floating]) -> NDArray[np.float64]:
+    """(n, 27) what each evidence adds to the logit of floating: its own weight, its square, half of each product."""
     standard = np.clip((evidence - np.array(CENTERS)) / np.array(SPREADS), -_FARTHEST, _FARTHEST)
-    i, j = np.triu_indices(standard.shape[1])
-    return np.column_stack([np.ones(len(standard)), standard, standard[:, i] * standard[:, j]])
+    k = standard.shape[1]
+    products = np.zeros((k, k))
+    products[np.triu_indices(k)] = WEIGHTS[1 + k :]
+    return standard * (np.array(WEIGHTS[1 : 1 + k]) + standard @ (0.5 * (products + products.T)))

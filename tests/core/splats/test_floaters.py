@@ -4,10 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
 
 from splap_editor.core.place import Place, placed_splats
-from splap_editor.core.splats import floater_evidence
-from splap_editor.core.splats.contributions import contributions
+from splap_editor.core.progress import in_turn
+from splap_editor.core.splats import surroundings
+from splap_editor.core.splats.floater_evidence import EVIDENCE, REASONS
 from splap_editor.core.splats.floaters import floaters
 from splap_editor.core.splats.occupancy import occupancy_ellipses
 from splap_editor.core.splats.splats import Splats
@@ -23,7 +26,7 @@ PLACE = Place(rotate=(0.8, 0.0, 0.6, 0.0), translate=(1.0, 2.0, 3.0), scale=2.0)
 def likelihoods(splats):
     """(N,) of every file row, 0 for inert ones."""
     ellipses = occupancy_ellipses(splats)
-    made = floaters(ellipses, contributions(splats, ellipses))
+    made = floaters(splats, ellipses)
     held = np.zeros(splats.n_splats)
     held[ellipses.rows] = made.likelihoods
     return held, made, ellipses
@@ -50,18 +53,56 @@ def test_what_is_known_of_a_splat_among_its_nearest_is_as_the_slow_twin_says(sce
     removed = np.ones(splats.n_splats, bool)
     removed[:: splats.n_splats // 150] = False
     ellipses = occupancy_ellipses(splats, removed=removed)
-    neighbors, distances = floater_evidence.nearest(ellipses.centers)
+    around = surroundings.surroundings(ellipses)
+    neighbors, distances = around.neighbors, around.distances
     ways = np.linalg.norm(ellipses.centers[:, None] - ellipses.centers, axis=2)
-    np.testing.assert_allclose(distances, np.sort(ways, axis=1)[:, 1 : 1 + floater_evidence.N_NEAREST])
+    np.testing.assert_allclose(distances, np.sort(ways, axis=1)[:, 1 : 1 + surroundings.N_NEAREST])
     assert not (neighbors == np.arange(ellipses.n_nodes)[:, None]).any()
-    logits, strays = np.log(ellipses.opacities / (1.0001 - ellipses.opacities)), floater_evidence._STRAY
-    found, ties = np.empty((len(neighbors), 9)), np.zeros((2, *neighbors.shape), bool)
-    shapes = ellipses.centers, ellipses.semi_axes, ellipses.normals, ellipses.reaches
-    floater_evidence._local(neighbors, distances, *shapes, logits, np.array(strays), found, ties)
-    slow, slow_ties = local_evidence(neighbors, distances, ellipses, logits, floater_evidence._THICKNESS, strays)
-    np.testing.assert_allclose(found, slow, atol=1e-9)
-    np.testing.assert_array_equal(ties, slow_ties)
-    assert ties.any() and not ties.all()
+    logits, strays = surroundings.bounded_logits(ellipses), surroundings._STRAY
+    slow, slow_ties = local_evidence(neighbors, distances, ellipses, logits, surroundings._THICKNESS, strays)
+    np.testing.assert_allclose(around.local, slow, atol=1e-9)
+    for found, ties in zip((around.narrow, around.wide), slow_ties, strict=True):
+        np.testing.assert_array_equal(found.tied, ties)
+        assert ties.any() and not ties.all()
+
+
+def test_pieces_are_the_connected_components_of_the_ties_between_some_nodes(scene):
+    ellipses = occupancy_ellipses(scene[0])
+    ties = surroundings.surroundings(ellipses).narrow
+    n = len(ties.neighbors)
+    nodes = np.random.default_rng(3).random(n) < 0.7
+    goes = ties.tied & nodes[:, None] & nodes[ties.neighbors]
+    pairs = sparse.coo_array((np.ones(goes.sum()), (np.nonzero(goes)[0], ties.neighbors[goes])), (n, n))
+    found, known = ties.pieces(nodes), connected_components(pairs, directed=False)[1]
+    both = np.unique(np.stack([found, known]), axis=1)
+    assert both.shape[1] == found.max() + 1 == known.max() + 1
+    first = np.unique(found, return_index=True)[1]
+    assert (np.diff(first) > 0).all()
+
+
+def test_what_is_found_does_not_depend_on_how_parts_are_run(scene):
+    splats, _ = scene
+    ellipses = occupancy_ellipses(splats)
+
+    def backwards(parts, told):
+        return in_turn(parts[::-1], told)[::-1]
+
+    np.testing.assert_array_equal(
+        floaters(splats, ellipses).likelihoods, floaters(splats, ellipses, run=backwards).likelihoods
+    )
+
+
+def test_every_evidence_says_one_reason():
+    assert sorted(name for names in REASONS.values() for name in names) == sorted(EVIDENCE)
+
+
+def test_far_specks_are_given_away_by_their_place(scene):
+    splats, is_floater = scene
+    _, made, ellipses = likelihoods(splats)
+    words = np.array(list(REASONS))[made.reasons]
+    floats = is_floater[ellipses.rows] & made.at(0.5)
+    beyond = ~ellipses.subject.holds(ellipses.centers, room=0.2 * ellipses.scene_scale)
+    assert np.isin(words[floats & beyond], ("apart from the rest", "few splats about it", "a small piece")).mean() > 0.8
 
 
 @pytest.mark.parametrize("kind", ["half 9 times sparser", "half transparent", "two objects", "thin bars"])
@@ -105,4 +146,4 @@ def test_a_scene_of_one_splat_has_no_floater():
     removed = np.ones(splats.n_splats, bool)
     removed[ellipses.rows[0]] = False
     one = occupancy_ellipses(splats, removed=removed)
-    assert len(floaters(one, contributions(splats, one)).at(0.5)) == 1
+    assert len(floaters(splats, one).at(0.5)) == 1
