@@ -1,7 +1,6 @@
 """Floaters in the window: groups in a list, looked at, kept, removed."""
 
 import numpy as np
-import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QStyle, QStyleOptionViewItem
@@ -11,8 +10,7 @@ from splap_editor.tools.floaters_tool import FloaterOptions
 from tests.ui.conftest import WAIT_MS
 
 
-@pytest.fixture
-def panel(driver):
+def taken_up(driver):
     """The panel, groups in it."""
     tool = driver.window.tools.tools["floaters"]
     tool.context.held(FloaterOptions).set(FloaterOptions(0.99))
@@ -36,7 +34,8 @@ def click(panel, row: int, *, tick: bool = False) -> None:
     QTest.mouseClick(panel.list.viewport(), Qt.MouseButton.LeftButton, pos=spot(panel, row, tick=tick))
 
 
-def test_the_panel_is_there_with_its_tool_and_lists_the_groups(driver, panel):
+def test_the_panel_is_there_with_its_tool_and_lists_the_groups(driver):
+    panel = taken_up(driver)
     found = driver.window.tools.chosen.found
     assert panel.isVisible() and panel.model.rowCount() == found.n_groups > 1
     text = panel.model.index(0).data()
@@ -46,7 +45,8 @@ def test_the_panel_is_there_with_its_tool_and_lists_the_groups(driver, panel):
     assert not panel.isVisible() and panel.model.rowCount() == 0
 
 
-def test_a_row_frames_its_group_and_its_tick_keeps_it(driver, panel):
+def test_a_row_frames_its_group_and_its_tick_keeps_it(driver):
+    panel = taken_up(driver)
     tool, flown = driver.window.tools.chosen, []
     tool.context.fly_to = flown.append
     click(panel, 1)
@@ -62,18 +62,22 @@ def test_a_row_frames_its_group_and_its_tick_keeps_it(driver, panel):
     assert driver.scene.edit.removed is None
 
 
-def test_the_slider_is_the_strength_and_the_step_keeps_it(driver, panel):
+def test_the_slider_is_the_strength_and_the_step_keeps_it(driver):
+    panel = taken_up(driver)
     tool = driver.window.tools.chosen
-    panel.strength.setValue(97)
-    driver.qtbot.waitUntil(lambda: tool.found.strength == 0.97, timeout=WAIT_MS)
     n = len(tool.found.rows)
-    assert n > 0 and panel.take.isEnabled()
+    panel.strength.setValue(0)
+    driver.qtbot.waitUntil(lambda: tool.found.strength == 0.0, timeout=WAIT_MS)
+    assert not tool.found.n_groups and not panel.take.isEnabled() and panel.status.text() == "Nothing floats."
+    panel.strength.setValue(99)
+    driver.qtbot.waitUntil(lambda: tool.found.strength == 0.99, timeout=WAIT_MS)
     driver.key(Qt.Key.Key_Return)
     assert driver.scene.removed.sum() == n
-    assert driver.scene.edit.removal.steps[0].picked == PickedFloaters(0.97)
+    assert driver.scene.edit.removal.steps[0].picked == PickedFloaters(0.99)
 
 
-def test_escape_and_leave_change_nothing(driver, panel):
+def test_escape_and_leave_change_nothing(driver):
+    panel = taken_up(driver)
     edit, tool = driver.scene.edit, driver.window.tools.chosen
     driver.key(Qt.Key.Key_Escape)
     assert tool.found is None and not panel.take.isEnabled() and "Click the picture" in panel.status.text()
