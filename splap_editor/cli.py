@@ -14,7 +14,7 @@ from splap_editor.core.graph.options import EDGE_OPTIONS, GraphOptions
 from splap_editor.core.options import options_of
 from splap_editor.installation import commands as installation
 from splap_editor.session.background_thread import leave
-from splap_editor.stage_report import ShareLine, StageReport
+from splap_editor.stage_report import ShareLine, StageReport, printable
 
 if TYPE_CHECKING:
     from splap_editor.io.formats.table import SplatFormat
@@ -42,7 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return options.run(options)
     except (ValueError, OSError, MemoryError) as error:
-        print(f"splap-editor: {_sentence(error)}", file=sys.stderr)
+        print(f"splap-editor: {printable(_sentence(error))}", file=sys.stderr)
         return EXIT_REFUSED
     except KeyboardInterrupt:
         print("splap-editor: stopped; no file was left half-written", file=sys.stderr)
@@ -324,7 +324,11 @@ def _graph(options: argparse.Namespace) -> int:
     wanted = GraphOptions(**{name: value for name, value in vars(options).items() if name in EDGE_OPTIONS})
     info = graph_info(write_graph(options.output, file, wanted, stages=report.stage))
     report.end_stage()
-    print(json.dumps(info)) if options.json else report.say(_readable(info))
+    if options.json:
+        print(json.dumps(info))
+    else:
+        for line in _readable(info).splitlines():
+            report.say(line)
     return EXIT_OK
 
 
@@ -334,14 +338,14 @@ _COMMANDS = ("edit", "deform", "convert", "clean", "place", "render", "info", "g
 def _readable(info: dict, indent: str = "") -> str:
     lines = []
     for key, value in info.items():
-        name = key.replace("_", " ")
+        name = printable(key.replace("_", " "))
         if isinstance(value, dict):
             lines += [f"{indent}{name}:", _readable(value, indent + "  ")]
         elif isinstance(value, list):
             lines.append(f"{indent}{name}: " + ("none" if not value else ""))
-            lines += [f"{indent}  - {item}" for item in value]
+            lines += [f"{indent}  - {printable(str(item))}" for item in value]
         else:
-            lines.append(f"{indent}{name}: {value:,}" if isinstance(value, int) else f"{indent}{name}: {value}")
+            lines.append(f"{indent}{name}: " + (f"{value:,}" if isinstance(value, int) else printable(str(value))))
     return "\n".join(lines)
 
 

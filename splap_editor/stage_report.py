@@ -7,6 +7,11 @@ from types import TracebackType
 from splap_editor.core.progress import Progress
 
 
+def printable(text: str) -> str:
+    """Text for a terminal: what it would obey rather than show stands by its number, as the escape in a file's name."""
+    return "".join(sign if sign.isprintable() else sign.encode("unicode_escape").decode() for sign in text)
+
+
 class StageReport:
     """Prints ``stage  42 %`` on a terminal while a stage runs, and ``stage  1.3 s`` when it ends.
 
@@ -65,7 +70,7 @@ class StageReport:
     def say(self, text: str) -> None:
         """Print a line unless quiet."""
         if not self._quiet:
-            print(text, file=sys.stderr)
+            print(printable(text), file=sys.stderr)
 
 
 class ShareLine:

@@ -278,3 +278,20 @@ def test_compiling_is_one_line_on_the_terminal(is_live, capsys, monkeypatch):
     told = capsys.readouterr().err
     assert told.count("\n") == 1 and told.endswith("\n") and told.startswith(("\rcompiling", "compiling"))
     assert ("100 %" in told) == is_live
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="names there hold no control characters")
+def test_a_terminal_obeys_nothing_that_a_file_says(tmp_path, capsys):
+    sound = tmp_path / "good\x1b]0;mine\x07\n\u202e.ply"
+    shutil.copy(TUBE, sound)
+    assert main(["info", str(sound)]) == 0
+    assert main(["convert", str(sound), "-o", str(sound.with_suffix(".splat"))]) == 2
+    assert main(["convert", str(sound), "-o", str(sound.with_suffix(".spz"))]) == 0
+    damaged = tmp_path / "bad\x1b[2J.ply"
+    damaged.write_bytes(b"ply\nformat binary_little_endian 1.0\nelement \x1b[31m 1\nelement vertex 0\nend_header\n")
+    assert main(["info", str(damaged)]) == 2
+    told = capsys.readouterr()
+    shown = (told.out + told.err).replace("\n", "")
+    assert shown.isprintable()
+    assert r"good\x1b]0;mine\x07\n\u202e.spz" in shown and r"bad\x1b[2J.ply" in shown
+    assert told.err.splitlines()[-1].startswith(r"splap-editor: bad\x1b[2J.ply"), "one line"

@@ -26,7 +26,10 @@ def main(stage_path: str, out: str) -> int:
     """Write the arrays of all splats of a stage, in the axes of a PLY."""
     from pxr import Usd, UsdGeom
 
-    _limit(Path(stage_path).stat().st_size)
+    limit(Path(stage_path).stat().st_size)
+    layers: list[Any] = []
+    if not _opened(stage_path, layers):
+        return _told("names a layer that is no regular file", "Export it again.")
     stage = Usd.Stage.Open(stage_path)
     prims = [prim for prim in stage.Traverse() if prim.GetTypeName() == "ParticleField3DGaussianSplat"]
     if not prims:
@@ -59,7 +62,30 @@ def main(stage_path: str, out: str) -> int:
     return 0
 
 
-def _limit(n_bytes: int) -> None:
+def _opened(stage_path: str, layers: list[Any]) -> bool:
+    """Open the layers that a stage is composed of; whether all are files, which would not keep their reader waiting."""
+    from pxr import Sdf
+
+    seen, left = {stage_path}, [stage_path]
+    while left:
+        path = left.pop()
+        # What stands in a package is named after it: scene.usdz[layer.usdc].
+        file = Path(path.partition("[")[0])
+        if file.exists() and not file.is_file():
+            return False
+        layer = None
+        # What is wrong with a layer is told where the stage is opened.
+        with contextlib.suppress(Exception):
+            layer = Sdf.Layer.FindOrOpen(path)
+        if layer:
+            layers.append(layer)
+            found = {layer.ComputeAbsolutePath(named) for named in layer.GetCompositionAssetDependencies() if named}
+            left += found - seen
+            seen |= found
+    return True
+
+
+def limit(n_bytes: int) -> None:
     """Take no more memory and processor time than a stage of that size needs: a damaged one asks for any amount."""
     with contextlib.suppress(ImportError):
         import resource

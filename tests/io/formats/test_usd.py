@@ -1,6 +1,9 @@
 """OpenUSD: prims anywhere on a stage, animations in one file, and what is no good."""
 
 import dataclasses
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -116,6 +119,48 @@ def test_damaged_bytes_end_in_a_sentence(tmp_path, scene):
         (tmp_path / "bad.usdc").write_bytes(bad)
         with pytest.raises(FormatError, match=r"bad\.usdc is damaged|holds no"):
             read_splats(tmp_path / "bad.usdc")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no pipes with names")
+@pytest.mark.parametrize("arc", ["(subLayers = [@./{}@])", "def Xform {}a{} (references = @./{}@) {{}}"])
+def test_a_stage_that_names_a_pipe_does_not_wait_for_it(tmp_path, arc):
+    os.mkfifo(tmp_path / "pipe.usda")
+    (tmp_path / "between.usda").write_text("#usda 1.0\n(subLayers = [@./pipe.usda@])\n")
+    quote = ('"', '"') if "Xform" in arc else ()
+    for named in ("pipe.usda", "between.usda"):
+        path = tmp_path / "stage.usda"
+        path.write_text("#usda 1.0\n" + arc.format(*quote, named) + "\n")
+        with pytest.raises(FormatError, match="names a layer that is no regular file"):
+            read_splats(path)
+
+
+def test_layers_beside_a_stage_are_composed(tmp_path, scene):
+    write_splats(tmp_path / "held.usdc", scene, scene.splats)
+    (tmp_path / "stage.usda").write_text("#usda 1.0\n(subLayers = [@./gone.usda@, @./held.usdc@])\n")
+    np.testing.assert_array_equal(read_splats(tmp_path / "stage.usda").splats.means, scene.splats.means)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems do not keep to the limit")
+def test_the_process_that_opens_a_stage_gets_no_more_memory_than_a_stage_of_that_size_needs():
+    program = """
+import numpy as np
+from splap_editor.io.formats import usd_arrays
+usd_arrays.limit({n_bytes})
+np.empty({fits} << 20, np.uint8)
+try:
+    np.empty({more} << 20, np.uint8)
+except MemoryError:
+    print("no more")
+"""
+    # 1.5 GiB, and 32 times the file.
+    for n_bytes, fits, more in ((1 << 10, 1400, 1600), (8 << 20, 1600, 1900)):
+        done = subprocess.run(
+            [sys.executable, "-c", program.format(n_bytes=n_bytes, fits=fits, more=more)],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert (done.stdout, done.stderr) == ("no more\n", "")
 
 
 def test_reading_can_be_cancelled(tmp_path, scene):
