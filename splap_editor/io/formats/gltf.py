@@ -40,6 +40,8 @@ _JSON, _BIN = b"JSON", b"BIN\0"
 _TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
 _MOST_NODES = 1 << 16
+_MOST_CLOUDS = 1 << 12
+_LOOK_NODES = 256
 _MOST_ATTRIBUTES = 20
 """Four, and a coefficient of the harmonics each."""
 
@@ -71,7 +73,11 @@ def read(source: Source, progress: Progress) -> tuple[PlyTable, list[str]]:
         If it is damaged, holds no splats, or holds them in a way that is not read.
     """
     document = _Document(source, progress)
-    clouds = list(_clouds(document))
+    clouds: list[_Cloud] = []
+    for cloud in _clouds(document, progress):
+        if len(clouds) == _MOST_CLOUDS:
+            raise source.damaged(f"it has more than {_MOST_CLOUDS:,} clouds of splats, or nodes within themselves")
+        clouds.append(cloud)
     if not clouds:
         raise source.refused("holds no Gaussian splats", f"Choose a file with {EXTENSION} in it.")
     n_splats, degree = sum(cloud.n_splats for cloud in clouds), max(cloud.degree for cloud in clouds)
@@ -102,7 +108,7 @@ class _Document:
         text: bytes | memoryview = source.data
         if source.data[:4] == MAGIC:
             text = self._chunks()
-        held = parsed_json(bytes(text), source.damaged)
+        held = parsed_json(bytes(text), source.damaged, lambda: progress(0.0))
         if not isinstance(held, dict):
             raise source.damaged("its JSON is no object")
         self.held: dict[str, Any] = held
@@ -194,7 +200,7 @@ class _Document:
         return np.maximum(values.astype(np.float32) / np.iinfo(dtype).max, -1 if dtype.kind == "i" else 0)
 
 
-def _clouds(document: _Document) -> Iterator[_Cloud]:
+def _clouds(document: _Document, progress: Progress) -> Iterator[_Cloud]:
     """Primitives of splats of the scene's nodes, in order."""
     if not document.held.get("scenes"):
         nodes = document.held.get("nodes")
@@ -203,17 +209,26 @@ def _clouds(document: _Document) -> Iterator[_Cloud]:
         starts = document.item("scenes", document.held.get("scene", 0)).get("nodes", [])
     if not isinstance(starts, list | range):
         raise document.source.damaged("its scene names no nodes")
-    todo = [(number, np.eye(4)) for number in reversed(starts)]
-    n_seen = 0
-    while todo:
-        number, parent = todo.pop()
-        n_seen += 1
-        if n_seen > _MOST_NODES:
+    todo: list[tuple[Any, NDArray[np.float64]]] = []
+    n_known = n_seen = 0
+
+    def add(numbers: list[Any] | range, parent: NDArray[np.float64]) -> None:
+        nonlocal n_known
+        n_known += len(numbers)
+        if n_known > _MOST_NODES:
             raise document.source.damaged(f"it has more than {_MOST_NODES:,} nodes, or nodes within themselves")
+        todo.extend((number, parent) for number in reversed(numbers))
+
+    add(starts, np.eye(4))
+    while todo:
+        if n_seen % _LOOK_NODES == 0:
+            progress(0.0)
+        n_seen += 1
+        number, parent = todo.pop()
         node = document.item("nodes", number)
         world = parent @ _local(document, node)
         children = node.get("children", [])
-        todo += [(child, world) for child in reversed(children if isinstance(children, list) else [])]
+        add(children if isinstance(children, list) else [], world)
         if "mesh" in node:
             primitives = document.item("meshes", node["mesh"]).get("primitives")
             for primitive in primitives if isinstance(primitives, list) else []:

@@ -104,6 +104,8 @@ def _replaced(key: str, value: object):
     [
         (_replaced("meshes.0.primitives.0.extensions", {}), "holds no Gaussian splats"),
         (_replaced("nodes.0.children", [0]), "nodes within themselves"),
+        (_replaced("nodes.0.children", [0] * 70_000), "nodes within themselves"),
+        (lambda document: document["scenes"][0].update(nodes=[0] * 5000), "more than 4,096 clouds"),
         (_replaced("nodes.0.scale", [1, 2, 1]), "stretches its splats"),
         (_replaced("nodes.0.scale", [-1, -1, -1]), "mirrors"),
         (_replaced("nodes.0.rotation", "up"), "a node has rotation"),
