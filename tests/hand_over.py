@@ -26,6 +26,7 @@ from splap_editor.io.formats.bare_splats import alphas_of, bare_splats
 from splap_editor.io.formats.table import FORMATS
 from splap_editor.io.splat_files import read_splats, write_splats
 from splap_editor.resources import resource
+from tests.reference.ply import ply_bytes
 
 PACKAGE = "@playcanvas/splat-transform@2.7.1"
 SAMPLES = ("tube", "coil", "bench_2dgs", "windmill_2dgs")
@@ -48,6 +49,7 @@ def main() -> int:
         failures = 0
         for sample in SAMPLES:
             failures += _tried(sample, program, folder)
+        failures += _misread(program, folder)
     print(f"{failures} hand-overs failed")
     return bool(failures)
 
@@ -55,6 +57,23 @@ def main() -> int:
 def _installed(folder: Path) -> str:
     subprocess.run(["npm", "install", "--silent", "--prefix", str(folder), PACKAGE], check=True)
     return str(folder / "node_modules" / ".bin" / "splat-transform")
+
+
+def _misread(program: str, folder: Path) -> int:
+    """Hand over layouts that only 3DGS programs would misread, made plain for them; gives the number of failures."""
+    file = read_splats(resource("samples", "tube.ply"))
+    splats, failures = file.splats, 0
+    opacities = {"opacity": alphas_of(splats.logit_opacities).astype("f4")}
+    changes = {"spikinggs": opacities, "gof": {"filter_3D": np.full(splats.n_splats, 0.004, "f4")}}
+    for layout, columns in changes.items():
+        held = {name: np.asarray(values) for name, values in file.table.columns.items()} | columns
+        path, ours = folder / f"{layout}.ply", folder / f"{layout}_ours.ply"
+        path.write_bytes(ply_bytes(held))
+        own = read_splats(path, layout=layout)
+        write_splats(ours, own, own.splats, as_3dgs=True)
+        bare, _ = bare_splats(own.splats)
+        failures += _told(f"{ours.name} → splat-transform", "ply", bare, partial(_through, program, ours, folder))
+    return failures
 
 
 def _tried(sample: str, program: str, folder: Path) -> int:
@@ -79,6 +98,10 @@ def _tried(sample: str, program: str, folder: Path) -> int:
             failures += _told(f"{ours.name} → gsply", row.name, bare, partial(_of_gsply, ours))
         if row.name == "ply":
             failures += _told(f"{ours.name} → plyfile", row.name, bare, partial(_of_plyfile, ours, bare))
+    unbundled = folder / f"{sample}_theirs" / "meta.json"
+    unbundled.parent.mkdir()
+    _transformed(program, folder / f"{sample}_ours.ply", unbundled)
+    failures += _told(f"{sample}_theirs/meta.json → SpLap Editor", "sog", bare, partial(_read, unbundled))
     _transformed(program, folder / f"{sample}_ours.ply", folder / "theirs.csv")
     failures += _told(f"{sample}.csv", "csv", bare, partial(_of_csv, folder / "theirs.csv", bare))
     return failures

@@ -1,10 +1,12 @@
 """Few values that stand for many: a table of 256 numbers, and a palette of vectors."""
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.progress import Progress, part_of
-from splap_editor.io.formats.bare_splats import row_blocks
+from splap_editor.io.formats.bare_splats import BLOCK_ROWS, row_blocks
 
 _BINS = 1 << 14
 _ROUNDS = 24
@@ -81,7 +83,11 @@ def palette(vectors: NDArray[np.float32], progress: Progress) -> tuple[NDArray[n
         keys = np.empty(n, np.float32)
         for places in row_blocks(n, part_of(told, 0.7, 0.9)):
             keys[places] = vectors[order[places], widest[group[places]]]
-        order = order[np.lexsort((keys, group))]
+        # Whole groups at a time, of as many rows as are worked on at once, or the one group that has more.
+        cuts = np.unique(bounds[np.searchsorted(bounds, [*range(0, n, BLOCK_ROWS), n])])
+        for lo, hi in pairwise(cuts.tolist()):
+            told(0.9 + 0.1 * lo / n)
+            order[lo:hi] = order[lo:hi][np.lexsort((keys[lo:hi], group[lo:hi]))]
         # Halves of equal size keep every group alive to the last level.
         middles = bounds[:-1] + sizes // 2
         bounds = np.sort(np.concatenate([bounds, middles]))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from splap_editor.io.formats import bare_splats
+from splap_editor.io.formats import bare_splats, palettes
 from splap_editor.io.formats.palettes import codebook, palette
 
 
@@ -31,7 +31,8 @@ def test_the_ends_are_met_and_no_value_has_a_nearer_number():
 def test_a_palette_is_that_of_its_groups_however_many_rows_are_taken_at_a_time(monkeypatch):
     vectors = np.random.default_rng(1).normal(size=(900, 9)).astype(np.float32)
     entries, labels = palette(vectors, lambda share: None)
-    monkeypatch.setattr(bare_splats, "BLOCK_ROWS", 37)
+    for module in (bare_splats, palettes):
+        monkeypatch.setattr(module, "BLOCK_ROWS", 37)
     shares: list[float] = []
     again, same = palette(vectors, shares.append)
     np.testing.assert_array_equal(labels, same)
