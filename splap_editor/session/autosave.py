@@ -1,6 +1,7 @@
 """Autosave: the edit in the user's state folder, half a second behind what is on screen."""
 
 import threading
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -9,7 +10,7 @@ from time import monotonic
 from splap_editor.io.session_file import write_session_file
 from splap_editor.session.background_thread import BackgroundThread, joined
 from splap_editor.session.documents import Documents
-from splap_editor.session.jobs import Post
+from splap_editor.session.jobs import Job, Post, Starter
 from splap_editor.session.recovery import LeftBehind, Orphan, RecoverySlot, left_behind, new_slot, recovery_folder
 from splap_editor.session.saved_state import SavedState
 from splap_editor.session.signals import Signal
@@ -26,7 +27,7 @@ class Autosave:
 
     The file is written on a thread of its own, whole or not at all. A process
     that ends by `close` removes it; one that dies, or is told to, leaves it
-    for the next start, which finds it by `left_behind`.
+    for the next start, which finds it by `seek`.
 
     Parameters
     ----------
@@ -57,13 +58,16 @@ class Autosave:
         self._keeps = False
         self._has_failed = False
         self._wake = threading.Condition()
+        self._seeking = Starter(post, name="splap-recovery")
         self._thread = BackgroundThread(self._run, name="splap-autosave", stop=partial(self._end, keep=True))
         self._thread.start()
         documents.changed.connect(self._on_changed)
 
-    def left_behind(self) -> LeftBehind:
-        """Edits that other processes left behind when they died, the newest first."""
-        return left_behind(self._folder)
+    def seek(self, found: Callable[[LeftBehind], None]) -> None:
+        """Find the edits that other processes left behind when they died, in the background; ``found`` is told."""
+        self._seeking.submit(
+            Job("recovery", "", lambda job: left_behind(self._folder, job.progress("looking for kept edits")), found)
+        )
 
     def restore(self, orphan: Orphan) -> None:
         """Bring an edit back; its file becomes the recovery file of this process once it is on screen."""
@@ -78,6 +82,7 @@ class Autosave:
             Write what is not written yet, and leave it for the next start: nobody was asked about it.
         """
         self._documents.changed.disconnect(self._on_changed)
+        self._seeking.close()
         self._end(keep=keep)
         if not joined((self._thread,), WRITE_TIMEOUT_S):
             # It is in the middle of a write that blocks; the lock says so as long as the process lives.

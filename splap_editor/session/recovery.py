@@ -8,6 +8,7 @@ from pathlib import Path
 
 import platformdirs
 
+from splap_editor.core.progress import Cancelled, Progress, no_progress
 from splap_editor.io.file_lock import FileLock
 from splap_editor.io.session_file import SUFFIX, read_session_file
 from splap_editor.io.session_specs import SessionFile
@@ -95,20 +96,27 @@ class LeftBehind:
     set_aside: list[Path]
 
 
-def left_behind(folder: Path) -> LeftBehind:
+def left_behind(folder: Path, progress: Progress = no_progress) -> LeftBehind:
     """Find the edits that dead processes left in a folder.
 
     Files of living processes are left alone. One that cannot be read gets
     another name, under which no later start looks at it; locks and
-    half-written files without an edit are cleared away.
+    half-written files without an edit are cleared away. ``progress`` is called
+    while long ones are read; where it cancels, all are left for the next start.
     """
-    found, set_aside = [], []
-    for path in sorted(folder.glob(f"*{SUFFIX}")):
-        orphan = _orphan(path)
-        if isinstance(orphan, Orphan):
-            found.append(orphan)
-        elif orphan is not None:
-            set_aside.append(orphan)
+    found: list[Orphan] = []
+    set_aside: list[Path] = []
+    try:
+        for path in sorted(folder.glob(f"*{SUFFIX}")):
+            orphan = _orphan(path, progress)
+            if isinstance(orphan, Orphan):
+                found.append(orphan)
+            elif orphan is not None:
+                set_aside.append(orphan)
+    except Cancelled:
+        for orphan in found:
+            orphan.release()
+        raise
     for path in folder.glob("*.lock"):
         with contextlib.suppress(OSError):
             slot = RecoverySlot(path.with_suffix(SUFFIX), FileLock(path))
@@ -119,14 +127,17 @@ def left_behind(folder: Path) -> LeftBehind:
     return LeftBehind(sorted(found, key=lambda orphan: -orphan.saved_at), set_aside)
 
 
-def _orphan(path: Path) -> Orphan | Path | None:
+def _orphan(path: Path, progress: Progress) -> Orphan | Path | None:
     """The edit in a file, or the name the file was given since there is none; None if another process has it."""
     try:
         lock = FileLock(_lock_path(path))
     except OSError:
         return None
     try:
-        return Orphan(RecoverySlot(path, lock), read_session_file(path), path.stat().st_mtime)
+        return Orphan(RecoverySlot(path, lock), read_session_file(path, progress), path.stat().st_mtime)
+    except Cancelled:
+        lock.release()
+        raise
     # Whatever is wrong with one file, the program must start and offer the others.
     except Exception:
         aside = path.with_name(path.name + ".unreadable")

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from splap_editor.core.handle_nodes import Region
+from splap_editor.core.progress import Cancelled
 from splap_editor.engine.edit import Pose
 from splap_editor.io.file_lock import FileLock
 from splap_editor.io.session_file import read_session_file, write_session_file
@@ -128,10 +129,36 @@ def test_undoing_back_to_the_saved_state_leaves_nothing_to_recover(desk):
     assert desk.files == []
 
 
+def sought(desk):
+    found = []
+    desk.autosave.seek(found.append)
+    desk.main.run_until(lambda: found)
+    return found[0]
+
+
+def test_a_search_that_is_given_up_leaves_every_edit_for_the_next_start(tmp_path):
+    folder = tmp_path / "recovery"
+    paths = {left_behind(folder, 1.0), left_behind(folder, 2.0)}
+    shares = []
+
+    def stop(share):
+        shares.append(share)
+        # In the middle of the second file.
+        if 1.0 in shares and share < 1.0:
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        found_in(folder, stop)
+    found = found_in(folder)
+    assert {orphan.slot.path for orphan in found.orphans} == paths and found.set_aside == []
+    for orphan in found.orphans:
+        orphan.release()
+
+
 def test_files_of_living_processes_are_left_alone(desk):
     desk.open()
     desk.move(0.25)
-    assert desk.autosave.left_behind().orphans == []
+    assert sought(desk).orphans == []
     assert len(desk.files) == 1
 
 
@@ -139,8 +166,8 @@ def test_an_orphan_comes_back_with_its_document_and_stays_recoverable_until_save
     document = tmp_path / "work.splap"
     left_behind(desk.folder, 0.75, document=document)
     desk.open()
-    (orphan,) = desk.autosave.left_behind().orphans
-    assert desk.autosave.left_behind().orphans == [], "one start at a time is offered an edit"
+    (orphan,) = sought(desk).orphans
+    assert sought(desk).orphans == [], "one start at a time is offered an edit"
     before = desk.scene
     desk.autosave.restore(orphan)
     desk.main.run_until(lambda: desk.scene is not before)
@@ -160,7 +187,7 @@ def test_an_orphan_whose_capture_is_gone_is_kept(desk, tmp_path):
     write_session_file(
         path, SessionFile(PlySpec(str(tmp_path / "gone.ply"), "", 1), held.recipe, held.handles, document="")
     )
-    (orphan,) = desk.autosave.left_behind().orphans
+    (orphan,) = sought(desk).orphans
     desk.autosave.restore(orphan)
     desk.main.run_until(lambda: desk.failures)
     assert "gone.ply is not where" in str(desk.failures[0])
@@ -170,7 +197,7 @@ def test_an_orphan_whose_capture_is_gone_is_kept(desk, tmp_path):
 
 def test_a_discarded_orphan_is_gone(desk):
     left_behind(desk.folder)
-    (orphan,) = desk.autosave.left_behind().orphans
+    (orphan,) = sought(desk).orphans
     orphan.slot.remove()
     assert list(desk.folder.iterdir()) == []
 

@@ -188,6 +188,7 @@ def test_an_edit_left_behind_is_offered_back(driver, qtbot, ply, choice):
     leave_behind(driver, qtbot, ply, 0.3)
     window, bar = driver.window, driver.window.recovery_bar
     bar.look()
+    qtbot.waitUntil(lambda: bar.text != "", timeout=WAIT_MS)
     assert "Your edit of capture.ply" in bar.text
     before = driver.scene
     if choice == "restore":

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QWidget
 
 from splap_editor.session.autosave import Autosave
 from splap_editor.session.crash_report import new_crash_reports
-from splap_editor.session.recovery import Orphan
+from splap_editor.session.recovery import LeftBehind, Orphan
 from splap_editor.ui.theme import STEP, icon
 from splap_editor.ui.widgets.plain_text import PlainLabel
 
@@ -59,8 +59,10 @@ class RecoveryBar(QFrame):
         return self._text.text() if not self.isHidden() else ""
 
     def look(self) -> None:
-        """Look for what was left behind, say what happened, and offer the newest edit."""
-        found = self._autosave.left_behind()
+        """Look for what was left behind, in the background; then say what happened, and offer the newest edit."""
+        self._autosave.seek(self._show)
+
+    def _show(self, found: LeftBehind) -> None:
         self._orphans = found.orphans
         self._notes = [f"The program crashed; what is known of it is in {path}." for path in new_crash_reports()[:1]]
         self._notes += [f"A kept edit could not be read and is set aside as {path}." for path in found.set_aside]
