@@ -122,6 +122,7 @@ def _add_deform(deform: argparse.ArgumentParser) -> None:
         help=_AS_3DGS,
     )
     deform.add_argument("--columns", default="", metavar="NAMES", help="also write quantities: displacement,stretch")
+    deform.add_argument("--report", action="store_true", help="say where the pose tears or draws out the surface")
     deform.add_argument("--no-cache", action="store_true", help="neither read nor keep graph and Laplacian")
     _add_output(deform)
     deform.set_defaults(run=_deform)
@@ -205,6 +206,7 @@ def _render(options: argparse.Namespace) -> int:
 def _deform(options: argparse.Namespace) -> int:
     from splap_editor.engine.bound_edit import posed
     from splap_editor.engine.cache import StageCache
+    from splap_editor.engine.deformation_check import posed_check
     from splap_editor.engine.quantities import column_names
     from splap_editor.engine.scripting import write_posed
     from splap_editor.frames_cli import deform_frames, edit_for, read_edit_file
@@ -229,15 +231,19 @@ def _deform(options: argparse.Namespace) -> int:
         columns=columns,
         snapshot=made.snapshot if columns else None,
         as_3dgs=options.as_3dgs,
+        check=posed_check(made, stages=report.stage) if options.report else None,
         stages=report.stage,
     )
     report.end_stage()
     deformation = made.deformation
     if not options.json:
         report.say(str(summary))
+        for line in summary.check.lines if summary.check is not None else ():
+            report.say(line)
         return EXIT_OK
     told = {
         **vars(summary),
+        "check": None if summary.check is None else summary.check.told,
         "output": str(options.output),
         "residual": _known(deformation.residual) if deformation is not None else 0.0,
         "n_iterations": deformation.n_iterations if deformation is not None else 0,

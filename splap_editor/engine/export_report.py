@@ -2,12 +2,16 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
 from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.edit import Edit
+
+if TYPE_CHECKING:
+    from splap_editor.engine.deformation_check import DeformationCheck
 
 
 @dataclass(frozen=True)
@@ -27,6 +31,8 @@ class ExportReport:
         Rows of the source that are not in the file.
     is_placed : bool
         Everything was moved, turned or scaled as one body.
+    check : DeformationCheck, optional
+        What the pose spoils, where it was looked at.
     """
 
     path: Path
@@ -36,6 +42,7 @@ class ExportReport:
     largest_stretch: float
     n_removed: int = 0
     is_placed: bool = False
+    check: "DeformationCheck | None" = None
 
     def __str__(self) -> str:
         parts = [f"{self.path.name}: {self.n_splats:,} splats, unchanged"]
@@ -47,15 +54,22 @@ class ExportReport:
             ]
         parts += [f"{self.n_removed:,} removed"] if self.n_removed else []
         parts += ["all of them put in their place"] if self.is_placed else []
+        parts += [f"look at {self.check}"] if self.check is not None and self.check.places else []
         return ", ".join(parts)
 
 
-def export_report(path: Path, splats: Splats, kernels: AdaptedKernels | None, edit: Edit) -> ExportReport:
+def export_report(
+    path: Path,
+    splats: Splats,
+    kernels: AdaptedKernels | None,
+    edit: Edit,
+    check: "DeformationCheck | None" = None,
+) -> ExportReport:
     """Compare adapted kernels with the splats they came from, before these are put in their place."""
     n_removed = edit.removal.n_removed
     n_written, is_placed = splats.n_splats - n_removed, not edit.place.is_identity
     if kernels is None or not kernels.changed.any():
-        return ExportReport(path, n_written, 0, 0.0, 1.0, n_removed, is_placed)
+        return ExportReport(path, n_written, 0, 0.0, 1.0, n_removed, is_placed, check)
     rows = np.flatnonzero(kernels.changed)
     moved = kernels.means[rows] - np.asarray(splats.means, np.float64)[rows]
     with np.errstate(invalid="ignore", over="ignore"):
@@ -69,4 +83,5 @@ def export_report(path: Path, splats: Splats, kernels: AdaptedKernels | None, ed
         float(np.exp(growth.max())) if growth.size else 1.0,
         n_removed,
         is_placed,
+        check,
     )

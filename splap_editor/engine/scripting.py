@@ -16,6 +16,7 @@ from splap_editor.core.progress import Runner, StageProgress, in_turn, silent
 from splap_editor.core.splats.occupancy import Ellipses, occupancy_ellipses
 from splap_editor.engine.bound_edit import posed, written_splats
 from splap_editor.engine.cache import StageCache
+from splap_editor.engine.deformation_check import DeformationCheck, posed_check
 from splap_editor.engine.edit import Edit
 from splap_editor.engine.export_report import ExportReport, export_report
 from splap_editor.engine.quantities import Snapshot, columns_of
@@ -60,6 +61,7 @@ def deform(
     layout: str | None = None,
     columns: Sequence[str] = (),
     as_3dgs: bool = False,
+    is_checked: bool = False,
     cache: StageCache | None = None,
     stages: StageProgress = silent,
     run: Runner = in_turn,
@@ -77,14 +79,23 @@ def deform(
         Quantities to write too, see `QUANTITIES`.
     as_3dgs : bool
         Add a thin third scale to a file of two.
+    is_checked : bool
+        Look for tears, webs and spikes too, see `splap_editor.engine.deformation_check`.
     cache, stages, run
         As of `posed`.
     """
     file = read_splats(source, layout=layout, progress=stages("read"))
     made = posed(file, edit, cache=cache, stages=stages, run=run, with_surface=bool(columns))
-    snapshot = made.snapshot if columns else None
     return write_posed(
-        output, file, made.kernels, made.edit, columns=columns, snapshot=snapshot, as_3dgs=as_3dgs, stages=stages
+        output,
+        file,
+        made.kernels,
+        made.edit,
+        columns=columns,
+        snapshot=made.snapshot if columns else None,
+        as_3dgs=as_3dgs,
+        check=posed_check(made, stages=stages) if is_checked else None,
+        stages=stages,
     )
 
 
@@ -97,6 +108,7 @@ def write_posed(
     columns: Sequence[str] = (),
     snapshot: Snapshot | None = None,
     as_3dgs: bool = False,
+    check: DeformationCheck | None = None,
     stages: StageProgress = silent,
 ) -> ExportReport:
     """Write posed splats, as a PLY with only what changed changed, and say what changed.
@@ -115,6 +127,8 @@ def write_posed(
         What they are worked out from; needed where there are any.
     as_3dgs : bool
         Add a thin third scale to a file of two.
+    check : DeformationCheck, optional
+        What the pose spoils, for the report.
     stages : callable
         ``stages(name)`` gives the progress callback of a stage.
     """
@@ -125,7 +139,7 @@ def write_posed(
     progress = stages("write")
     extra = columns_of(columns, snapshot) if snapshot is not None else {}
     write_splats(path, file, splats, removed=edit.removed, as_3dgs=as_3dgs, extra=extra, progress=progress)
-    return export_report(Path(path), file.splats, kernels, edit)
+    return export_report(Path(path), file.splats, kernels, edit, check)
 
 
 def write_graph(

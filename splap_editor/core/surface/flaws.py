@@ -1,0 +1,144 @@
+"""Flaws of a pose: tears, webs and spikes as places that a person would look at, worst first."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+from splap_editor.core.index_spaces import Nodes
+from splap_editor.core.surface.posed_surface import PosedSurface
+from splap_editor.core.surface.spikes import spikes
+from splap_editor.core.surface.tears import OPEN, tears
+from splap_editor.core.surface.webs import webs
+
+LEAST_PAIRS = {"tear": 3, "web": 1, "spike": 1}
+"""A place of fewer pairs is left out: one splat that comes off is no tear."""
+
+SEEN = 1e-5
+"""What fills less of a picture is not seen, in units of s²: about three pixels of one 600 wide."""
+
+_MOST_STRAIN = 4.0
+
+
+@dataclass(frozen=True, eq=False)
+class Flaw:
+    """One place where a pose does to the surface what nobody wants.
+
+    Parameters
+    ----------
+    kind : str
+        ``"tear"``, ``"web"`` or ``"spike"``.
+    nodes : (k,) int64
+        Splats concerned, ascending.
+    first, second : (a,), (b,) int64
+        Those on either side, the side that moved more first; without a second side for a spike.
+    size : float
+        World units: what is open, by how much a web is drawn out, how long a spike is.
+    severity : float
+        Area that is seen of it in a picture, in units of s², times how many times it is strained.
+    """
+
+    kind: str
+    nodes: Nodes
+    first: Nodes
+    second: Nodes
+    size: float
+    severity: float
+
+
+class _Signs(NamedTuple):
+    """Signs of one kind of flaw: pairs (P, 2) of nodes, by how much they grew in units of s, and how many times."""
+
+    kind: str
+    pairs: Nodes
+    longer: NDArray[np.float64]
+    strains: NDArray[np.float64]
+
+
+def flaws(posed: PosedSurface, rest_axes: NDArray[np.float32], epsilon: float) -> list[Flaw]:
+    """Find where a pose tears, webs and draws out the surface.
+
+    Linear in the number of nodes, and quick where little moved.
+
+    Parameters
+    ----------
+    posed : PosedSurface
+    rest_axes : (n, 2, 3) float32
+        In-plane axes at rest, one standard deviation long, in world units.
+    epsilon : float
+        Tolerance of a contact along the normals in world units.
+
+    Returns
+    -------
+    list of Flaw
+        Worst first; nothing that is too small to be seen, or hidden.
+    """
+    torn = tears(posed, epsilon)
+    drawn = webs(posed, torn.pairs)
+    nodes, growths = spikes(posed, rest_axes)
+    alone = ~np.isin(nodes, np.concatenate([torn.pairs.ravel(), drawn.links.ravel()]))
+    nodes, growths = nodes[alone], growths[alone]
+    lengths = 4.0 * np.sqrt(np.square(posed.axes[nodes]).sum(axis=2).max(axis=1, initial=0.0)) / posed.scale
+    signs = (
+        _Signs("tear", torn.pairs, torn.gaps, _strains(posed, torn.pairs)),
+        _Signs("web", drawn.links, drawn.longer, _strains(posed, drawn.links)),
+        _Signs("spike", np.stack([nodes, nodes], axis=1), lengths, growths - 1.0),
+    )
+    found = [flaw for each in signs for flaw in _places(posed, each)]
+    return sorted(found, key=lambda flaw: -flaw.severity)
+
+
+def _strains(posed: PosedSurface, pairs: Nodes) -> NDArray[np.float64]:
+    rest, moved = posed.distances(pairs)
+    return (moved - rest) / np.maximum(rest, np.finfo(float).tiny)
+
+
+def _places(posed: PosedSurface, signs: _Signs) -> list[Flaw]:
+    """Signs that lie beside each other as one flaw each, those too small to be seen left out."""
+    pairs = signs.pairs
+    if not len(pairs):
+        return []
+    labels = _labels(posed, pairs)
+    found = []
+    for label in range(labels.max() + 1):
+        own = np.flatnonzero(labels == label)
+        size = float(signs.longer[own].max())
+        if len(own) < LEAST_PAIRS[signs.kind] or size < OPEN:
+            continue
+        nodes = np.unique(pairs[own])
+        strains = np.zeros(posed.n_nodes)
+        np.maximum.at(strains, pairs[own].ravel(), np.repeat(np.minimum(signs.strains[own], _MOST_STRAIN), 2))
+        seen = posed.seen[nodes]
+        if seen.sum() < SEEN:
+            continue
+        first, second = _sides(posed, pairs[own])
+        severity = float(seen @ strains[nodes])
+        found.append(Flaw(signs.kind, nodes, first, second, size * posed.scale, severity))
+    return found
+
+
+def _labels(posed: PosedSurface, pairs: Nodes) -> NDArray[np.int32]:
+    """(P,) place of each pair: those whose nodes lie beside each other are of one."""
+    n = posed.n_nodes
+    marked = np.zeros(n, bool)
+    marked[pairs] = True
+    beside = np.concatenate([posed.beside[marked[posed.beside].all(axis=1)], pairs])
+    together = sp.csr_array((np.ones(len(beside), np.int8), (beside[:, 0], beside[:, 1])), shape=(n, n))
+    return np.unique(connected_components(together, directed=False)[1][pairs[:, 0]], return_inverse=True)[1]
+
+
+def _sides(posed: PosedSurface, pairs: Nodes) -> tuple[Nodes, Nodes]:
+    """Nodes on the side of the pairs that moved more, and on the other; none on both."""
+    moved = np.linalg.norm(posed.positions - posed.ellipses.centers, axis=1)[pairs]
+    swapped = moved[:, 1] > moved[:, 0]
+    first = np.where(swapped, pairs[:, 1], pairs[:, 0])
+    second = np.where(swapped, pairs[:, 0], pairs[:, 1])
+    nodes, places = np.unique(np.concatenate([first, second]), return_inverse=True)
+    # A node that is on both sides goes to the one on which it is more often.
+    votes = np.bincount(places, np.repeat([1.0, -1.0], len(pairs)))
+    if (pairs[:, 0] == pairs[:, 1]).all():
+        return nodes, np.zeros(0, np.int64)
+    return nodes[votes > 0.0], nodes[votes <= 0.0]

@@ -1,0 +1,105 @@
+"""Webs: where a contact holds back what should be free, and the surface is drawn out between the two."""
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from splap_editor.core.index_spaces import Nodes
+from splap_editor.core.surface.posed_surface import PosedSurface, near_rows
+from splap_editor.core.surface.tears import slants
+
+LONGER, STRETCHED = 0.003, 1.15
+"""What grew by less, in units of s and of its length, is no web."""
+
+WEIGHTS = (-7.5, 0.2, 0.7, 3.6, 2.3, 2.8)
+"""Of 1 and each evidence."""
+
+_MOST_BESIDE = 20.0
+
+
+class Webs(NamedTuple):
+    """Links between two parts that came apart but for them.
+
+    Parameters
+    ----------
+    links : (W, 2) int32
+        Nodes i < j.
+    longer : (W,) float64
+        By how much they grew, in units of s.
+    """
+
+    links: NDArray[np.int32]
+    longer: NDArray[np.float64]
+
+
+def webs(posed: PosedSurface, torn: Nodes) -> Webs:
+    """Find what a pose draws out between two parts.
+
+    A neck that is bent or pulled stretches all through: beside it is nothing.
+    Beside a web are the two surfaces that it ties, which came apart. So a link
+    that grew is one if, beside it, splats parted of which one is near its one
+    end along the surface and the other near its other; if it grew more than all
+    around it, is long, and rises out of the tangent planes.
+
+    Parameters
+    ----------
+    posed : PosedSurface
+    torn : (T, 2) int32
+        Parted pairs that should not have parted: strands across a tear are no webs.
+
+    Returns
+    -------
+    Webs
+    """
+    links, rest, moved = posed.links
+    longer = (moved - rest) / posed.scale
+    grown = (longer > LONGER) & (moved > STRETCHED * rest) & ~posed.tied[links].all(axis=1)
+    links = links[grown]
+    if not len(links):
+        return Webs(links, longer[grown])
+    is_web = evidence(posed, links, grown, torn) @ np.array(WEIGHTS) > 0.0
+    return Webs(links[is_web], longer[grown][is_web])
+
+
+def evidence(posed: PosedSurface, links: Nodes, grown: NDArray[np.bool_], torn: Nodes) -> NDArray[np.float64]:
+    """(W, 6) what the model weighs of those links that grew; all logarithms but 1 and the sine.
+
+    1, stretch, how many pairs beside it parted, how much more it is stretched than all around, how much longer it was
+    at rest than those around, sine of its step out of the tangent planes.
+    """
+    every, rest, moved = posed.links
+    strain = np.abs(moved / rest - 1.0)
+    around = _around(posed, every, strain), _around(posed, every, rest)
+    strains, lengths = (each[links].mean(axis=1) for each in around)
+    rest, strain = rest[grown], strain[grown]
+    return np.column_stack(
+        [
+            np.ones(len(links)),
+            np.log1p(strain),
+            np.log1p(np.minimum(_parted_beside(posed, links, torn), _MOST_BESIDE)),
+            np.log((strain + 0.02) / (strains + 0.02)),
+            np.log(rest / lengths),
+            slants(posed, links),
+        ]
+    )
+
+
+def _around(posed: PosedSurface, links: Nodes, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,) mean of the links' values at each node's neighbours and itself."""
+    n = posed.n_nodes
+    sums, counts = np.bincount(links.ravel(), np.repeat(values, 2), n), np.bincount(links.ravel(), minlength=n)
+    means = sums / np.maximum(counts, 1.0)
+    more = np.bincount(links[:, 0], means[links[:, 1]], n) + np.bincount(links[:, 1], means[links[:, 0]], n)
+    return (means + more) / (1.0 + counts)
+
+
+def _parted_beside(posed: PosedSurface, links: Nodes, torn: Nodes) -> NDArray[np.float64]:
+    """(W,) number of parted pairs of which one node is near the one end along the surface and one near the other."""
+    n, (pairs, _) = posed.n_nodes, posed.partings
+    pairs = pairs[~np.isin(pairs @ np.array([n, 1]), torn @ np.array([n, 1]))]
+    both = np.concatenate([pairs, pairs[:, ::-1]])
+    parted = sp.csr_array((np.ones(len(both)), (both[:, 0], both[:, 1])), shape=(n, n))
+    near = [near_rows(posed.neighborhoods, links[:, end]) for end in (0, 1)]
+    return np.asarray((near[0] @ parted).multiply(near[1]).sum(axis=1)).ravel()
