@@ -10,6 +10,7 @@ from splap_editor.core.deformer import Deformation
 from splap_editor.core.index_spaces import FileMask, FileRow
 from splap_editor.core.splats.occupancy import Ellipses
 from splap_editor.core.splats.splats import Splats
+from splap_editor.engine.deformation_check import DeformationCheck
 from splap_editor.engine.edit import Edit
 from splap_editor.engine.surface import Surface
 from splap_editor.io.ply import SplatFile
@@ -32,6 +33,7 @@ class Scene:
         self.preview: Edit | None = None
         self.kernels: AdaptedKernels | None = None
         self.deformation: Deformation | None = None
+        self.check: DeformationCheck | None = None
         self.selection = np.zeros(file.splats.n_splats, bool)
         self.shows_removed = False
         self.hidden = np.zeros(file.splats.n_splats, bool)
@@ -47,6 +49,7 @@ class Scene:
         self.edit_changed = Signal()
         self.preview_changed = Signal()
         self.pose_changed = Signal()
+        self.check_changed = Signal()
         self.selection_changed = Signal()
         self.hidden_changed = Signal()
         self.removed_changed = Signal()
@@ -124,10 +127,16 @@ class Scene:
         self.preview_changed.emit()
 
     def set_pose(self, kernels: AdaptedKernels | None, deformation: Deformation | None = None) -> None:
-        """Show adapted kernels, or the rest pose."""
+        """Show adapted kernels, or the rest pose; what a check found in the pose before is forgotten."""
         self.kernels = kernels
         self.deformation = deformation
+        self.check = None
         self.pose_changed.emit()
+
+    def set_check(self, check: DeformationCheck) -> None:
+        """Take what a check found in the pose on screen."""
+        self.check = check
+        self.check_changed.emit()
 
     def set_selection(self, selection: FileMask) -> None:
         """Replace the (N,) selection mask."""

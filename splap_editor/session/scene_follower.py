@@ -16,6 +16,7 @@ class SceneHandlers(TypedDict, total=False):
     edit_changed: Handler
     preview_changed: Handler
     pose_changed: Handler
+    check_changed: Handler
     selection_changed: Handler
     hidden_changed: Handler
     removed_changed: Handler

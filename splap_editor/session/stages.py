@@ -200,7 +200,7 @@ def _pose_request(ledger: Ledger) -> PoseRequest:
 def _export_request(ledger: Ledger) -> ExportRequest:
     scene = ledger.shown_scene
     snapshot = snapshot_of(scene, ledger.bound)
-    return ExportRequest(ledger.exports[0], scene, scene.edit, scene.file, scene.kernels, snapshot)
+    return ExportRequest(ledger.exports[0], scene, scene.edit, scene.file, scene.kernels, snapshot, scene.check)
 
 
 # Where what was made goes ---------------------------------------------------------------------------------------------

@@ -15,6 +15,7 @@ from splap_editor.core.splats.occupancy import Ellipses, occupancy_ellipses
 from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.bound_edit import BoundEdit, Posed, bind, ready_for_drags
 from splap_editor.engine.cache import StageCache
+from splap_editor.engine.deformation_check import DeformationCheck
 from splap_editor.engine.edit import Edit
 from splap_editor.engine.export_report import ExportReport
 from splap_editor.engine.quantities import Snapshot
@@ -212,6 +213,7 @@ class ExportRequest:
     file: SplatFile
     kernels: AdaptedKernels | None
     snapshot: Snapshot = field(repr=False)
+    check: DeformationCheck | None = None
 
 
 EXPORT_WORDS = {"colour": "rotating colours", "write": "writing"}
@@ -235,5 +237,6 @@ def exported_file(job: Job, request: ExportRequest) -> ExportReport:
         columns=order.columns,
         snapshot=request.snapshot,
         as_3dgs=order.as_3dgs,
+        check=request.check,
         stages=stages,
     )

@@ -6,6 +6,7 @@ from PySide6.QtWidgets import QWidget
 
 from splap_editor.core.index_spaces import FileRows
 from splap_editor.session.graph_preview import GraphPreview
+from splap_editor.session.pose_check import PoseCheck
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.session.signals import Signal
@@ -15,6 +16,7 @@ from splap_editor.tools.tool import ToolContext
 from splap_editor.tools.tool_manager import ToolManager
 from splap_editor.ui.actions.actions import ActionSet
 from splap_editor.ui.actions.graph_actions import GraphActions
+from splap_editor.ui.panels.check_panel import CheckPanel
 from splap_editor.ui.panels.graph_panel import GraphPanel
 from splap_editor.ui.panels.inspect_panel import InspectPanel
 from splap_editor.ui.panels.quantity_panel import QuantityPanel
@@ -86,7 +88,10 @@ class Inspection:
         self.inspect_panel.edge_toggled.connect(self.graph_actions.toggle_edge)
         self.graph_panel = GraphPanel(session, self.graph_view, self.preview)
         self.graph_panel.component_chosen.connect(self.look_at)
+        self.pose_check = PoseCheck(session)
+        self.check_panel = CheckPanel(session, self._view, self._tools, self._fly_to_rows)
         self.panels: tuple[tuple[str, QWidget], ...] = (
+            ("Check", self.check_panel),
             ("Quantities", self.quantity_panel),
             ("Inspect", self.inspect_panel),
             ("Graph", self.graph_panel),
@@ -109,9 +114,12 @@ class Inspection:
         self.graph_view.changed.connect(check)
         check()
 
+    def _fly_to_rows(self, rows: FileRows) -> None:
+        self._fly_to(self._view.viewport.frame(rows))
+
     def look_at(self, rows: FileRows) -> None:
         """Fly to some splats, and inspect the first of them."""
-        self._fly_to(self._view.viewport.frame(rows))
+        self._fly_to_rows(rows)
         self.inspected.pick(int(rows[0]))
 
     def _on_tool_chosen(self) -> None:

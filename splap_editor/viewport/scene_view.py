@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -135,7 +136,7 @@ class SceneView:
         self._fixed_tint = "auto"
         self._tinted_for: tuple[object, ...] = ()
         self._paints: dict[str, NDArray[np.uint8]] = {}
-        self._marks: tuple[tuple[FileRows, tuple[int, int, int, int]], ...] = ()
+        self._marks: dict[str, tuple[tuple[FileRows, tuple[int, int, int, int]], ...]] = {}
         self._view_job = LatestJob(session.view_worker, "view")
         self._is_dragged = False
         self._claim: Claim | None = None
@@ -201,11 +202,13 @@ class SceneView:
         self._tinted_for = ("stale",)
         self._show_tints()
 
-    def mark(self, marks: Iterable[tuple[FileRows, tuple[int, int, int, int]]]) -> None:
-        """Lay a colour and its share, 0..255, over some file rows, above tints and paint; none: no marks."""
+    def mark(self, marks: Iterable[tuple[FileRows, tuple[int, int, int, int]]], layer: str = "inspect") -> None:
+        """Lay a colour and its share, 0..255, over some file rows, above tints and paint; none: no marks of a layer."""
         marks = tuple(marks)
-        if marks or self._marks:
-            self._marks = marks
+        if marks or layer in self._marks:
+            self._marks.pop(layer, None)
+            if marks:
+                self._marks[layer] = marks
             self._tinted_for = ("stale",)
             self._show_tints()
 
@@ -274,7 +277,7 @@ class SceneView:
 
     def _on_scene_changed(self) -> None:
         self._scene = scene = self._session.shown_scene
-        self._tinted_for, self._paints, self._marks = (), {}, ()
+        self._tinted_for, self._paints, self._marks = (), {}, {}
         self.viewport.gizmo.detach()
         if self._depicts is not scene.splats:
             self.depict(scene.splats)()
@@ -416,7 +419,7 @@ class SceneView:
             tints = tints.copy()
             if shows_removed:
                 tints[scene.removed] = REMOVED_TINT
-            for marked, rgba in self._marks:
+            for marked, rgba in chain.from_iterable(self._marks.values()):
                 tints[marked] = rgba
         self.viewport.splats.set_tints(tints)
 

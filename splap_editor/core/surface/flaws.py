@@ -12,7 +12,7 @@ from splap_editor.core.index_spaces import Nodes
 from splap_editor.core.surface.posed_surface import PosedSurface
 from splap_editor.core.surface.spikes import spikes
 from splap_editor.core.surface.tears import OPEN, tears
-from splap_editor.core.surface.webs import webs
+from splap_editor.core.surface.webs import parted_about, webs
 
 LEAST_PAIRS = {"tear": 3, "web": 1, "spike": 1}
 """A place of fewer pairs is left out: one splat that comes off is no tear."""
@@ -87,7 +87,7 @@ def flaws(posed: PosedSurface, rest_axes: NDArray[np.float32], epsilon: float) -
         _Signs("web", drawn.links, drawn.longer, _strains(posed, drawn.links)),
         _Signs("spike", np.stack([nodes, nodes], axis=1), lengths, growths - 1.0),
     )
-    found = [flaw for each in signs for flaw in _places(posed, each)]
+    found = [flaw for each in signs for flaw in _places(posed, each, torn.pairs)]
     return sorted(found, key=lambda flaw: -flaw.severity)
 
 
@@ -96,7 +96,7 @@ def _strains(posed: PosedSurface, pairs: Nodes) -> NDArray[np.float64]:
     return (moved - rest) / np.maximum(rest, np.finfo(float).tiny)
 
 
-def _places(posed: PosedSurface, signs: _Signs) -> list[Flaw]:
+def _places(posed: PosedSurface, signs: _Signs, torn: Nodes) -> list[Flaw]:
     """Signs that lie beside each other as one flaw each, those too small to be seen left out."""
     pairs = signs.pairs
     if not len(pairs):
@@ -114,7 +114,12 @@ def _places(posed: PosedSurface, signs: _Signs) -> list[Flaw]:
         seen = posed.seen[nodes]
         if seen.sum() < SEEN:
             continue
-        first, second = _sides(posed, pairs[own])
+        across = pairs[own]
+        if signs.kind == "web":
+            # Links of the drawn-out surface on either side are among its own; the longest alone tell the sides.
+            about = parted_about(posed, across, torn)
+            across = about if len(about) else across[signs.longer[own] > 0.5 * size]
+        first, second = _sides(posed, across)
         severity = float(seen @ strains[nodes])
         found.append(Flaw(signs.kind, nodes, first, second, size * posed.scale, severity))
     return found

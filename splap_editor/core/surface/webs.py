@@ -97,9 +97,22 @@ def _around(posed: PosedSurface, links: Nodes, values: NDArray[np.float64]) -> N
 
 def _parted_beside(posed: PosedSurface, links: Nodes, torn: Nodes) -> NDArray[np.float64]:
     """(W,) number of parted pairs of which one node is near the one end along the surface and one near the other."""
-    n, (pairs, _) = posed.n_nodes, posed.partings
-    pairs = pairs[~np.isin(pairs @ np.array([n, 1]), torn @ np.array([n, 1]))]
+    n, pairs = posed.n_nodes, _rightly_parted(posed, torn)
     both = np.concatenate([pairs, pairs[:, ::-1]])
     parted = sp.csr_array((np.ones(len(both)), (both[:, 0], both[:, 1])), shape=(n, n))
     near = [near_rows(posed.neighborhoods, links[:, end]) for end in (0, 1)]
     return np.asarray((near[0] @ parted).multiply(near[1]).sum(axis=1)).ravel()
+
+
+def parted_about(posed: PosedSurface, links: Nodes, torn: Nodes) -> Nodes:
+    """(Q, 2) parted pairs near some links: what lies on either side of a web, where its own nodes may be of both."""
+    near = np.zeros(posed.n_nodes, bool)
+    near[near_rows(posed.neighborhoods, np.unique(links)).indices] = True
+    pairs = _rightly_parted(posed, torn)
+    return pairs[near[pairs].all(axis=1)]
+
+
+def _rightly_parted(posed: PosedSurface, torn: Nodes) -> Nodes:
+    """(Q, 2) parted pairs but for those that the surface was torn between."""
+    n, (pairs, _) = posed.n_nodes, posed.partings
+    return pairs[~np.isin(pairs @ np.array([n, 1]), torn @ np.array([n, 1]))]
