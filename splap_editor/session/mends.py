@@ -5,6 +5,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 
 from splap_editor.core.graph.splat_graph import GraphOptions, SplatGraph
 from splap_editor.core.index_spaces import FileMask, FileRows, RowPair
@@ -44,19 +46,26 @@ class FragmentLinks(NamedTuple):
     pairs : list of RowPair
     n_tied, n_far, n_unlike : int
         See `FragmentContacts`.
+    n_pieces : int
+        Components of the graph once they are added.
     """
 
     pairs: list[RowPair]
     n_tied: int
     n_far: int
     n_unlike: int
+    n_pieces: int
 
 
 def fragment_links(splats: Splats, ellipses: Ellipses, graph: SplatGraph) -> FragmentLinks:
     """Contacts that tie each fragment that looks like a piece of the surface: see `fragment_contacts`."""
     colors = 0.5 + SH_C0 * np.asarray(splats.sh0, np.float64)[ellipses.rows]
     found = fragment_contacts(ellipses, graph, colors)
-    return FragmentLinks(_as_pairs(ellipses.rows[found.pairs]), found.n_tied, found.n_far, found.n_unlike)
+    n, (a, b) = int(graph.components.max(initial=-1)) + 1, graph.components[found.pairs].T
+    n_pieces = connected_components(sp.csr_array((np.ones(len(a)), (a, b)), shape=(n, n)), directed=False)[0]
+    return FragmentLinks(
+        _as_pairs(ellipses.rows[found.pairs]), found.n_tied, found.n_far, found.n_unlike, int(n_pieces)
+    )
 
 
 def _as_pairs(rows: FileRows) -> list[RowPair]:

@@ -212,6 +212,10 @@ class SceneView:
             self._tinted_for = ("stale",)
             self._show_tints()
 
+    def marks(self, layer: str) -> tuple[tuple[FileRows, tuple[int, int, int, int]], ...]:
+        """Rows and colours of a layer's marks, the last on top."""
+        return self._marks.get(layer, ())
+
     def rows_of_handles(self, handle_ids: Iterable[int]) -> FileRows:
         """File rows that these handles hold, empty while nothing is bound."""
         bound = self._session.bound

@@ -76,8 +76,10 @@ def test_fragments_are_tied_as_file_rows(apart):
     splats, ellipses, graph = apart
     links = fragment_links(splats, ellipses, graph)
     contacts = fragment_contacts(ellipses, graph, np.full((ellipses.n_nodes, 3), 0.5))
-    assert links[1:] == contacts[1:] and links.n_far + links.n_tied + links.n_unlike == len(fragments(graph)) > 0
+    assert links[1:4] == contacts[1:] and links.n_far + links.n_tied + links.n_unlike == len(fragments(graph)) > 0
     assert {frozenset(pair) for pair in links.pairs} == row_edges(ellipses.rows, contacts.pairs)
+    tied = mended_graph(ellipses, graph, with_added(GraphOptions(), links.pairs))
+    assert links.n_pieces == tied.components.max() + 1 < graph.components.max() + 1
 
 
 def test_mends_come_back_from_a_recipe_and_the_command_line_honours_them(tube, tmp_path):

@@ -161,6 +161,7 @@ def test_fragments_are_listed_looked_at_and_joined_in_one_step(driver, tmp_path)
     driver.window.actions_["graph.join_fragments"].trigger()
     said = driver.window.toast.text
     assert said.startswith("Joined 1 fragment by") and "Left on purpose: 1 too far from everything" in said
+    assert "2 pieces are left" in said
     wait_remade(driver, surface)
     assert len(fragments(scene.surface.graph)) == 1 and driver.session.history.undo_label == "Join fragments"
 

@@ -53,14 +53,20 @@ def webs(posed: PosedSurface, torn: Nodes) -> Webs:
     -------
     Webs
     """
-    links, rest, moved = posed.links
-    longer = (moved - rest) / posed.scale
-    grown = (longer > LONGER) & (moved > STRETCHED * rest) & ~posed.tied[links].all(axis=1)
-    links = links[grown]
+    links, grown = grown_links(posed)
+    _, rest, moved = posed.links
+    longer = (moved - rest)[grown] / posed.scale
     if not len(links):
-        return Webs(links, longer[grown])
+        return Webs(links, longer)
     is_web = evidence(posed, links, grown, torn) @ np.array(WEIGHTS) > 0.0
-    return Webs(links[is_web], longer[grown][is_web])
+    return Webs(links[is_web], longer[is_web])
+
+
+def grown_links(posed: PosedSurface) -> tuple[Nodes, NDArray[np.bool_]]:
+    """(W, 2) links that may be webs, since they grew; which of all they are, (E,)."""
+    links, rest, moved = posed.links
+    grown = (moved - rest > LONGER * posed.scale) & (moved > STRETCHED * rest) & ~posed.tied[links].all(axis=1)
+    return links[grown], grown
 
 
 def evidence(posed: PosedSurface, links: Nodes, grown: NDArray[np.bool_], torn: Nodes) -> NDArray[np.float64]:

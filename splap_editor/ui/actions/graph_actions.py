@@ -83,6 +83,7 @@ class GraphActions:
         if links.pairs:
             self._change(with_added(self._options, links.pairs), "Join fragments")
         said = [f"Joined {_counted(links.n_tied, 'fragment')} by {_counted(len(links.pairs), 'contact')}."]
+        said.append("It is in one piece." if links.n_pieces == 1 else f"{links.n_pieces:,} pieces are left.")
         why = ((links.n_far, "too far from everything"), (links.n_unlike, "unlike what is near"))
         left = " and ".join(f"{n:,} {reason}" for n, reason in why if n)
         if left:
