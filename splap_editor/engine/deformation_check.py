@@ -15,7 +15,7 @@ from splap_editor.core.index_spaces import FileRows, NodeMask, Nodes, RowPair
 from splap_editor.core.progress import StageProgress, silent
 from splap_editor.core.splats.occupancy import Ellipses
 from splap_editor.core.surface.flaws import Flaw, flaws
-from splap_editor.core.surface.posed_surface import PosedSurface, pairs_beside
+from splap_editor.core.surface.posed_surface import Beside, PosedSurface, pairs_beside
 from splap_editor.engine.bound_edit import Posed
 from splap_editor.engine.quantities import Snapshot, contributions_of
 from splap_editor.engine.surface import Surface
@@ -172,15 +172,15 @@ def posed_surface(surface: Surface, kernels: AdaptedKernels, deformation: Deform
     )
 
 
-def beside_of(ellipses: Ellipses) -> NDArray[np.int32]:
-    """(B, 2) which nodes lie beside each other, found once per scene."""
+def beside_of(ellipses: Ellipses) -> Beside:
+    """Which nodes lie beside each other, found once per scene."""
     known = _BESIDE.get(ellipses)
     if known is None:
         known = _BESIDE[ellipses] = pairs_beside(ellipses)
     return known
 
 
-_BESIDE: WeakKeyDictionary[Ellipses, NDArray[np.int32]] = WeakKeyDictionary()
+_BESIDE: WeakKeyDictionary[Ellipses, Beside] = WeakKeyDictionary()
 """Of the scenes that are open."""
 
 
@@ -197,12 +197,14 @@ def joint_of(place: FlawPlace) -> Joint:
     return Joint(place.a, place.b, reach or 1.0)
 
 
-def _about(ellipses: Ellipses, beside: NDArray[np.int32], pairs: Iterable[RowPair]) -> NodeMask:
+def _about(ellipses: Ellipses, beside: Beside, pairs: Iterable[RowPair]) -> NodeMask:
     """(n,) the ends of some pairs of file rows, and what lies beside them."""
     mask = np.zeros(ellipses.n_nodes, bool)
     nodes = ellipses.node_of_row[np.array([row for pair in pairs for row in pair], np.int64)]
     mask[nodes[nodes >= 0]] = True
-    mask[beside[mask[beside].any(axis=1)]] = True
+    if mask.any():
+        around = beside.pairs
+        mask[around[mask[around[:, 0]] | mask[around[:, 1]]]] = True
     return mask
 
 

@@ -254,8 +254,8 @@ def fit(n_pulls: int) -> None:
                 known["tears"].append((tears.evidence(posed, pairs, epsilon), planting.near(pairs, 2.0, 0.02)))
             links, grown = webs.grown_links(posed)
             if len(links):
-                torn = tears.tears(posed, epsilon).pairs
-                known["webs"].append((webs.evidence(posed, links, grown, torn), ~planting.near(links, 2.5, 0.04)))
+                parted = webs.rightly_parted(posed, tears.tears(posed, epsilon).pairs)
+                known["webs"].append((webs.evidence(posed, links, grown, parted), ~planting.near(links, 2.5, 0.04)))
     for name, parts in known.items():
         x, truth = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
         weight = np.concatenate([np.full(len(each), 1.0 / max(len(each), 30)) for each, _ in parts])

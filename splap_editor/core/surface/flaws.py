@@ -87,7 +87,7 @@ def flaws(posed: PosedSurface, rest_axes: NDArray[np.float32], epsilon: float) -
         _Signs("web", drawn.links, drawn.longer, _strains(posed, drawn.links)),
         _Signs("spike", np.stack([nodes, nodes], axis=1), lengths, growths - 1.0),
     )
-    found = [flaw for each in signs for flaw in _places(posed, each, torn.pairs)]
+    found = [flaw for each in signs for flaw in _places(posed, each, drawn.parted)]
     return sorted(found, key=lambda flaw: -flaw.severity)
 
 
@@ -96,28 +96,28 @@ def _strains(posed: PosedSurface, pairs: Nodes) -> NDArray[np.float64]:
     return (moved - rest) / np.maximum(rest, np.finfo(float).tiny)
 
 
-def _places(posed: PosedSurface, signs: _Signs, torn: Nodes) -> list[Flaw]:
+def _places(posed: PosedSurface, signs: _Signs, parted: Nodes) -> list[Flaw]:
     """Signs that lie beside each other as one flaw each, those too small to be seen left out."""
     pairs = signs.pairs
     if not len(pairs):
         return []
     labels = _labels(posed, pairs)
+    strains = np.zeros(posed.n_nodes)
+    np.maximum.at(strains, pairs.ravel(), np.repeat(np.minimum(signs.strains, _MOST_STRAIN), 2))
     found = []
-    for label in range(labels.max() + 1):
-        own = np.flatnonzero(labels == label)
+    order = np.argsort(labels, kind="stable")
+    for own in np.split(order, np.flatnonzero(np.diff(labels[order])) + 1):
         size = float(signs.longer[own].max())
         if len(own) < LEAST_PAIRS[signs.kind] or size < OPEN:
             continue
         nodes = np.unique(pairs[own])
-        strains = np.zeros(posed.n_nodes)
-        np.maximum.at(strains, pairs[own].ravel(), np.repeat(np.minimum(signs.strains[own], _MOST_STRAIN), 2))
         seen = posed.seen[nodes]
         if seen.sum() < SEEN:
             continue
         across = pairs[own]
         if signs.kind == "web":
             # Links of the drawn-out surface on either side are among its own; the longest alone tell the sides.
-            about = parted_about(posed, across, torn)
+            about = parted_about(posed, across, parted)
             across = about if len(about) else across[signs.longer[own] > 0.5 * size]
         first, second = _sides(posed, across)
         severity = float(seen @ strains[nodes])
@@ -130,14 +130,14 @@ def _labels(posed: PosedSurface, pairs: Nodes) -> NDArray[np.int32]:
     n = posed.n_nodes
     marked = np.zeros(n, bool)
     marked[pairs] = True
-    beside = np.concatenate([posed.beside[marked[posed.beside].all(axis=1)], pairs])
+    beside = np.concatenate([posed.beside.within(marked), pairs])
     together = sp.csr_array((np.ones(len(beside), np.int8), (beside[:, 0], beside[:, 1])), shape=(n, n))
     return np.unique(connected_components(together, directed=False)[1][pairs[:, 0]], return_inverse=True)[1]
 
 
 def _sides(posed: PosedSurface, pairs: Nodes) -> tuple[Nodes, Nodes]:
     """Nodes on the side of the pairs that moved more, and on the other; none on both."""
-    moved = np.linalg.norm(posed.positions - posed.ellipses.centers, axis=1)[pairs]
+    moved = np.linalg.norm(posed.positions[pairs] - posed.ellipses.centers[pairs], axis=2)
     swapped = moved[:, 1] > moved[:, 0]
     first = np.where(swapped, pairs[:, 1], pairs[:, 0])
     second = np.where(swapped, pairs[:, 0], pairs[:, 1])

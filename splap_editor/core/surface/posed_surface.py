@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -19,6 +20,25 @@ PARTED = 0.006
 """Two splats that lie beside each other are parted once they are so much farther from each other, in units of s."""
 
 
+class Beside(NamedTuple):
+    """Which nodes lie beside each other at rest.
+
+    Parameters
+    ----------
+    pairs : (B, 2) int32
+        Nodes i < j, ascending, each pair once.
+    lengths : (B,) float64
+        How far apart they are, in world units.
+    """
+
+    pairs: NDArray[np.int32]
+    lengths: NDArray[np.float64]
+
+    def within(self, nodes: NodeMask) -> NDArray[np.int32]:
+        """(W, 2) pairs both of whose nodes are among some (n,)."""
+        return self.pairs[nodes[self.pairs[:, 0]] & nodes[self.pairs[:, 1]]]
+
+
 @dataclass(frozen=True, eq=False)
 class PosedSurface:
     """Nodes at rest and in a pose.
@@ -27,8 +47,8 @@ class PosedSurface:
     ----------
     ellipses : Ellipses
         n nodes at rest.
-    beside : (B, 2) int32
-        `pairs_beside` of them.
+    beside : Beside
+        Of them.
     neighborhoods : Neighborhoods
         Nearest along the surface.
     L : (n, n) csr_array
@@ -44,7 +64,7 @@ class PosedSurface:
     """
 
     ellipses: Ellipses
-    beside: NDArray[np.int32]
+    beside: Beside
     neighborhoods: Neighborhoods
     L: sp.csr_array
     positions: NDArray[np.float64]
@@ -69,9 +89,14 @@ class PosedSurface:
         return rest, posed
 
     @cached_property
+    def moved(self) -> NodeMask:
+        """(n,) nodes that are not at rest."""
+        return np.any(self.positions != self.ellipses.centers, axis=1)
+
+    @cached_property
     def links(self) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
         """(E, 2) nodes i < j that pull at each other, one at least moved; how far apart at rest and in the pose."""
-        n, moved = self.n_nodes, np.any(self.positions != self.ellipses.centers, axis=1)
+        n, moved = self.n_nodes, self.moved
         starts = np.repeat(np.arange(n, dtype=np.int32), np.diff(self.L.indptr))
         kept = (starts < self.L.indices) & (moved[starts] | moved[self.L.indices]) & (self.L.data < 0.0)
         links = np.stack([starts[kept], self.L.indices[kept]], axis=1).astype(np.int32, copy=False)
@@ -80,12 +105,13 @@ class PosedSurface:
     @cached_property
     def partings(self) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
         """(P, 2) parted nodes beside each other, not near along the surface; (P,) by how much, in units of s."""
-        opening = _distances(self.positions, self.beside)
-        opening -= _distances(self.ellipses.centers, self.beside)
-        opening /= self.scale
+        pairs, lengths = self.beside
+        either = self.moved[pairs[:, 0]] | self.moved[pairs[:, 1]]
+        pairs, lengths = pairs[either], lengths[either]
+        opening = (_distances(self.positions, pairs) - lengths) / self.scale
         parted = np.flatnonzero(opening > PARTED)
-        parted = parted[~self._are_near(self.beside[parted])]
-        return self.beside[parted], opening[parted]
+        parted = parted[~self._are_near(pairs[parted])]
+        return pairs[parted], opening[parted]
 
     def _are_near(self, pairs: Nodes) -> NDArray[np.bool_]:
         """(P,) whether one of two nodes is among the other's nearest along the surface."""
@@ -99,17 +125,17 @@ class PosedSurface:
         return near
 
 
-def pairs_beside(ellipses: Ellipses) -> NDArray[np.int32]:
-    """(B, 2) nodes i < j of which one is among the nearest in space of the other; each pair once, ascending."""
+def pairs_beside(ellipses: Ellipses) -> Beside:
+    """Find the pairs of nodes of which one is among the nearest in space of the other."""
     n = ellipses.n_nodes
     k = min(N_BESIDE + 1, n)
     if k < 2:
-        return np.empty((0, 2), np.int32)
+        return Beside(np.empty((0, 2), np.int32), np.empty(0))
     near = cKDTree(ellipses.centers).query(ellipses.centers, k)[1]
     starts = np.repeat(np.arange(n), k)
     low, high = np.minimum(starts, near.ravel()), np.maximum(starts, near.ravel())
-    keys = np.unique((low * n + high)[low < high])
-    return np.stack(np.divmod(keys, n), axis=1).astype(np.int32)
+    pairs = np.stack(np.divmod(np.unique((low * n + high)[low < high]), n), axis=1).astype(np.int32)
+    return Beside(pairs, _distances(ellipses.centers, pairs))
 
 
 def near_rows(neighborhoods: Neighborhoods, nodes: Nodes) -> sp.csr_array:

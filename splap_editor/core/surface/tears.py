@@ -85,8 +85,8 @@ def _smoothed(posed: PosedSurface, pairs: Nodes, values: NDArray[np.float64]) ->
     n = posed.n_nodes
     sums = np.bincount(pairs.ravel(), np.repeat(values, 2), n)
     counts = np.bincount(pairs.ravel(), minlength=n).astype(np.float64)
-    beside = np.concatenate([posed.beside, posed.beside[:, ::-1]])
-    beside = beside[(counts[beside] > 0.0).all(axis=1)]
+    beside = posed.beside.within(counts > 0.0)
+    beside = np.concatenate([beside, beside[:, ::-1]])
     more = [np.bincount(beside[:, 0], each[beside[:, 1]], n) for each in (sums, counts)]
     means = (sums + more[0]) / np.maximum(counts + more[1], 1.0)
     return means[pairs].mean(axis=1)
@@ -111,7 +111,8 @@ def _are_bridged(posed: PosedSurface, pairs: Nodes) -> NDArray[np.bool_]:
         return np.zeros(0, bool)
     concerned = np.zeros(n, bool)
     concerned[pairs] = True
-    beside = posed.beside[concerned[posed.beside].any(axis=1)]
+    around = posed.beside.pairs
+    beside = around[concerned[around[:, 0]] | concerned[around[:, 1]]]
     keys = beside[:, 0].astype(np.int64) * n + beside[:, 1]
     beside = beside[~np.isin(keys, parted[:, 0].astype(np.int64) * n + parted[:, 1])]
     rest, moved = posed.distances(beside)

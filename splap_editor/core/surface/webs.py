@@ -28,10 +28,13 @@ class Webs(NamedTuple):
         Nodes i < j.
     longer : (W,) float64
         By how much they grew, in units of s.
+    parted : (Q, 2) int32
+        What rightly parted beside them, and elsewhere.
     """
 
     links: NDArray[np.int32]
     longer: NDArray[np.float64]
+    parted: NDArray[np.int32]
 
 
 def webs(posed: PosedSurface, torn: Nodes) -> Webs:
@@ -55,11 +58,11 @@ def webs(posed: PosedSurface, torn: Nodes) -> Webs:
     """
     links, grown = grown_links(posed)
     _, rest, moved = posed.links
-    longer = (moved - rest)[grown] / posed.scale
+    longer, parted = (moved - rest)[grown] / posed.scale, rightly_parted(posed, torn)
     if not len(links):
-        return Webs(links, longer)
-    is_web = evidence(posed, links, grown, torn) @ np.array(WEIGHTS) > 0.0
-    return Webs(links[is_web], longer[is_web])
+        return Webs(links, longer, parted)
+    is_web = evidence(posed, links, grown, parted) @ np.array(WEIGHTS) > 0.0
+    return Webs(links[is_web], longer[is_web], parted)
 
 
 def grown_links(posed: PosedSurface) -> tuple[Nodes, NDArray[np.bool_]]:
@@ -69,7 +72,7 @@ def grown_links(posed: PosedSurface) -> tuple[Nodes, NDArray[np.bool_]]:
     return links[grown], grown
 
 
-def evidence(posed: PosedSurface, links: Nodes, grown: NDArray[np.bool_], torn: Nodes) -> NDArray[np.float64]:
+def evidence(posed: PosedSurface, links: Nodes, grown: NDArray[np.bool_], parted: Nodes) -> NDArray[np.float64]:
     """(W, 6) what the model weighs of those links that grew; all logarithms but 1 and the sine.
 
     1, stretch, how many pairs beside it parted, how much more it is stretched than all around, how much longer it was
@@ -84,7 +87,7 @@ def evidence(posed: PosedSurface, links: Nodes, grown: NDArray[np.bool_], torn: 
         [
             np.ones(len(links)),
             np.log1p(strain),
-            np.log1p(np.minimum(_parted_beside(posed, links, torn), _MOST_BESIDE)),
+            np.log1p(np.minimum(_parted_beside(posed, links, parted), _MOST_BESIDE)),
             np.log((strain + 0.02) / (strains + 0.02)),
             np.log(rest / lengths),
             slants(posed, links),
@@ -101,24 +104,22 @@ def _around(posed: PosedSurface, links: Nodes, values: NDArray[np.float64]) -> N
     return (means + more) / (1.0 + counts)
 
 
-def _parted_beside(posed: PosedSurface, links: Nodes, torn: Nodes) -> NDArray[np.float64]:
+def _parted_beside(posed: PosedSurface, links: Nodes, pairs: Nodes) -> NDArray[np.float64]:
     """(W,) number of parted pairs of which one node is near the one end along the surface and one near the other."""
-    n, pairs = posed.n_nodes, _rightly_parted(posed, torn)
-    both = np.concatenate([pairs, pairs[:, ::-1]])
+    n, both = posed.n_nodes, np.concatenate([pairs, pairs[:, ::-1]])
     parted = sp.csr_array((np.ones(len(both)), (both[:, 0], both[:, 1])), shape=(n, n))
     near = [near_rows(posed.neighborhoods, links[:, end]) for end in (0, 1)]
     return np.asarray((near[0] @ parted).multiply(near[1]).sum(axis=1)).ravel()
 
 
-def parted_about(posed: PosedSurface, links: Nodes, torn: Nodes) -> Nodes:
+def parted_about(posed: PosedSurface, links: Nodes, parted: Nodes) -> Nodes:
     """(Q, 2) parted pairs near some links: what lies on either side of a web, where its own nodes may be of both."""
     near = np.zeros(posed.n_nodes, bool)
     near[near_rows(posed.neighborhoods, np.unique(links)).indices] = True
-    pairs = _rightly_parted(posed, torn)
-    return pairs[near[pairs].all(axis=1)]
+    return parted[near[parted[:, 0]] & near[parted[:, 1]]]
 
 
-def _rightly_parted(posed: PosedSurface, torn: Nodes) -> Nodes:
+def rightly_parted(posed: PosedSurface, torn: Nodes) -> Nodes:
     """(Q, 2) parted pairs but for those that the surface was torn between."""
     n, (pairs, _) = posed.n_nodes, posed.partings
     return pairs[~np.isin(pairs @ np.array([n, 1]), torn @ np.array([n, 1]))]
