@@ -61,6 +61,8 @@ def deform_frames(options: argparse.Namespace) -> int:
 
     if options.columns:
         raise ValueError("--columns goes with one PLY, not with --frames")
+    if options.report:
+        raise ValueError("--report looks at one pose, not at --frames")
     report = StageReport(quiet=options.quiet or options.json)
     held = read_edit_file(options)
     if not isinstance(held, SessionFile):

@@ -62,6 +62,14 @@ def test_deform_bends_the_sample(tmp_path, recipe, capsys):
     assert plyfile.PlyData.read(out)["vertex"].data.dtype == plyfile.PlyData.read(TUBE)["vertex"].data.dtype
 
 
+def test_the_report_says_in_words_and_in_json_that_a_bent_tube_is_whole(tmp_path, recipe, capsys):
+    order = ["deform", str(TUBE), "--recipe", str(recipe), "-o", str(tmp_path / "out.ply"), "--report"]
+    assert main(order) == 0
+    assert "check: nothing torn or drawn out" in capsys.readouterr().err
+    assert main([*order, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["check"] == {"tears": 0, "webs": 0, "spikes": 0, "places": []}
+
+
 def test_a_recipe_without_handles_copies_the_file(tmp_path):
     recipe, out = tmp_path / "edit.json", tmp_path / "out.ply"
     recipe.write_text('{"version": 1, "method": "arap", "handles": []}')
