@@ -135,6 +135,7 @@ def test_the_whole_object_is_in_the_picture(tmp_path, ply):
         (["render", "--size", "20000x10"], "16384"),
         (["deform", "--frames", "--recipe", "EDIT"], "--frames needs keyframes"),
         (["deform", "--frames", "--columns", "stretch", "--session", "WORK"], "--columns goes with one PLY"),
+        (["deform", "--frames", "--report", "--session", "WORK"], "--report looks at one pose"),
         (["deform", "--frames", "9-3", "--session", "WORK"], "frames must be given as"),
         (["deform", "--session", "PLY"], "it is not text in UTF-8"),
     ],
