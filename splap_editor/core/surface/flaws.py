@@ -125,7 +125,7 @@ def _places(posed: PosedSurface, signs: _Signs, parted: Nodes) -> list[Flaw]:
     return found
 
 
-def _labels(posed: PosedSurface, pairs: Nodes) -> NDArray[np.int32]:
+def _labels(posed: PosedSurface, pairs: Nodes) -> NDArray[np.integer]:
     """(P,) place of each pair: those whose nodes lie beside each other are of one."""
     n = posed.n_nodes
     marked = np.zeros(n, bool)

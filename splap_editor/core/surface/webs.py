@@ -24,17 +24,17 @@ class Webs(NamedTuple):
 
     Parameters
     ----------
-    links : (W, 2) int32
+    links : (W, 2) int
         Nodes i < j.
     longer : (W,) float64
         By how much they grew, in units of s.
-    parted : (Q, 2) int32
+    parted : (Q, 2) int
         What rightly parted beside them, and elsewhere.
     """
 
-    links: NDArray[np.int32]
+    links: Nodes
     longer: NDArray[np.float64]
-    parted: NDArray[np.int32]
+    parted: Nodes
 
 
 def webs(posed: PosedSurface, torn: Nodes) -> Webs:
@@ -49,7 +49,7 @@ def webs(posed: PosedSurface, torn: Nodes) -> Webs:
     Parameters
     ----------
     posed : PosedSurface
-    torn : (T, 2) int32
+    torn : (T, 2) int
         Parted pairs that should not have parted: strands across a tear are no webs.
 
     Returns

@@ -54,7 +54,8 @@ class CheckPanel(QWidget):
         super().__init__(parent)
         self._session, self._view, self._tools, self._look_at = session, view, tools, look_at
         self.status = PlainLabel(wordWrap=True)
-        self.tinted = QCheckBox("Tint them on the surface", checked=True)
+        self.tinted = QCheckBox("Tint them on the surface")
+        self.tinted.setChecked(True)
         self.tinted.toggled.connect(self._tint)
         self.places: list[QPushButton] = []
         self.cures: list[QPushButton | None] = []
