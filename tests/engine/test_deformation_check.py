@@ -9,7 +9,9 @@ from scipy.spatial.transform import Rotation
 from splap_editor.core.adaptation.kernel_adaptation import adapt_kernels
 from splap_editor.core.deformer import Deformation
 from splap_editor.core.graph.options import GraphOptions
+from splap_editor.core.handle_nodes import Region
 from splap_editor.core.splats.splats import Splats
+from splap_editor.engine.bound_edit import Posed, bind
 from splap_editor.engine.deformation_check import (
     DeformationCheck,
     deformation_check,
@@ -17,7 +19,10 @@ from splap_editor.engine.deformation_check import (
     posed_check,
     separation_of,
 )
+from splap_editor.engine.edit import Edit, Handle, Pose
 from splap_editor.engine.surface import Surface, surface_of
+from splap_editor.io.ply import read_ply
+from splap_editor.resources import resource
 from tests.core.splat_scenes import joined, moved, sheet, shuffled
 
 N = 900
@@ -102,6 +107,18 @@ def test_the_cure_of_a_tear_ties_both_halves(slit):
 
 def test_what_was_cut_by_hand_may_come_apart(slit):
     assert not checked(slit, opened(slit, 0.05)).places
+
+
+def test_what_touches_and_hangs_together_the_long_way_round_may_part():
+    splats = sheet(N)
+    y = splats.means[:, 1]
+    far = tuple((a, b) for a, b in slit_rows(splats) if max(y[a], y[b]) > 0.15)
+    surface = as_if_plain(surface_of(splats, GraphOptions(cut=far)))
+    assert surface.graph.components.max() == 0
+    parted = surface.rest[:, 1:2] > 0.5
+    assert not checked(surface, np.where(parted, opened(surface, 0.05), surface.rest)).places
+    near = surface.rest[:, 1:2] > 0.2
+    assert checked(surface, np.where(near, opened(surface, 0.05), surface.rest)).places[0].kind == "tear"
 
 
 @pytest.mark.parametrize("gap", [0.0, 0.004])
@@ -200,7 +217,18 @@ def test_the_report_tells_each_place_with_a_cure_that_a_recipe_takes(slit):
     assert check.lines[0] == "check: 1 tear" and "came apart by up to" in check.lines[1]
 
 
-def test_where_nothing_is_posed_nothing_is_spoilt():
-    from splap_editor.engine.bound_edit import Posed
+def test_everyday_drags_of_a_trained_scene_are_silent():
+    surface = surface_of(read_ply(resource("samples", "windmill_2dgs.ply")).splats, GraphOptions())
+    rng, s = np.random.default_rng(23), surface.scene_scale
+    for middle in surface.rest[rng.choice(len(surface.rest), 3, replace=False)]:
+        rows = surface.ellipses.rows[np.linalg.norm(surface.rest - middle, axis=1) < 0.05 * s]
+        move = rng.normal(size=3)
+        move *= rng.uniform(0.02, 0.1) * s / np.linalg.norm(move)
+        handle = Handle(1, "", "#ffffff", Region(middle, 0.0, rows), Pose(tuple(map(float, move))))
+        posed = bind(surface, Edit((handle,)).with_options(surface.options)).pose()
+        assert np.linalg.norm(posed.deformation.positions - surface.rest, axis=1).max() > 0.015 * s
+        assert not posed_check(posed).places
 
+
+def test_where_nothing_is_posed_nothing_is_spoilt():
     assert str(posed_check(Posed(sheet(16)))) == "nothing torn or drawn out"

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse.csgraph import connected_components, dijkstra
 
 from splap_editor.core.index_spaces import Nodes
 from splap_editor.core.surface.posed_surface import PosedSurface
@@ -19,6 +19,12 @@ LEAST_PAIRS = {"tear": 3, "web": 1, "spike": 1}
 
 SEEN = 1e-5
 """What fills less of a picture is not seen, in units of s²: about three pixels of one 600 wide."""
+
+LONGEST_WAY = 0.15
+"""From one side of a tear to the other round its nearer end, in units of s, where both are of one piece.
+
+Two parts that touch hang together too, by a longer way, and may part; one that is torn right through comes off.
+"""
 
 _MOST_STRAIN = 4.0
 
@@ -50,12 +56,16 @@ class Flaw:
 
 
 class _Signs(NamedTuple):
-    """Signs of one kind of flaw: pairs (P, 2) of nodes, by how much they grew in units of s, and how many times."""
+    """Signs of one kind of flaw.
+
+    Pairs (P, 2) of nodes, by how much they grew in units of s, how many times, and which are sure.
+    """
 
     kind: str
     pairs: Nodes
     longer: NDArray[np.float64]
     strains: NDArray[np.float64]
+    are_sure: NDArray[np.bool_]
 
 
 def flaws(posed: PosedSurface, rest_axes: NDArray[np.float32], epsilon: float) -> list[Flaw]:
@@ -83,9 +93,9 @@ def flaws(posed: PosedSurface, rest_axes: NDArray[np.float32], epsilon: float) -
     nodes, growths = nodes[alone], growths[alone]
     lengths = 4.0 * np.sqrt(np.square(posed.axes[nodes]).sum(axis=2).max(axis=1, initial=0.0)) / posed.scale
     signs = (
-        _Signs("tear", torn.pairs, torn.gaps, _strains(posed, torn.pairs)),
-        _Signs("web", drawn.links, drawn.longer, _strains(posed, drawn.links)),
-        _Signs("spike", np.stack([nodes, nodes], axis=1), lengths, growths - 1.0),
+        _Signs("tear", torn.pairs, torn.gaps, _strains(posed, torn.pairs), np.ones(len(torn.pairs), bool)),
+        _Signs("web", drawn.links, drawn.longer, _strains(posed, drawn.links), drawn.are_sure),
+        _Signs("spike", np.stack([nodes, nodes], axis=1), lengths, growths - 1.0, np.ones(len(nodes), bool)),
     )
     found = [flaw for each in signs for flaw in _places(posed, each, drawn.parted)]
     return sorted(found, key=lambda flaw: -flaw.severity)
@@ -108,7 +118,7 @@ def _places(posed: PosedSurface, signs: _Signs, parted: Nodes) -> list[Flaw]:
     order = np.argsort(labels, kind="stable")
     for own in np.split(order, np.flatnonzero(np.diff(labels[order])) + 1):
         size = float(signs.longer[own].max())
-        if len(own) < LEAST_PAIRS[signs.kind] or size < OPEN:
+        if len(own) < LEAST_PAIRS[signs.kind] or size < OPEN or not signs.are_sure[own].any():
             continue
         nodes = np.unique(pairs[own])
         seen = posed.seen[nodes]
@@ -120,6 +130,8 @@ def _places(posed: PosedSurface, signs: _Signs, parted: Nodes) -> list[Flaw]:
             about = parted_about(posed, across, parted)
             across = about if len(about) else across[signs.longer[own] > 0.5 * size]
         first, second = _sides(posed, across)
+        if signs.kind == "tear" and not _are_one(posed, first, second):
+            continue
         severity = float(seen @ strains[nodes])
         found.append(Flaw(signs.kind, nodes, first, second, size * posed.scale, severity))
     return found
@@ -133,6 +145,14 @@ def _labels(posed: PosedSurface, pairs: Nodes) -> NDArray[np.integer]:
     beside = np.concatenate([posed.beside.within(marked), pairs])
     together = sp.csr_array((np.ones(len(beside), np.int8), (beside[:, 0], beside[:, 1])), shape=(n, n))
     return np.unique(connected_components(together, directed=False)[1][pairs[:, 0]], return_inverse=True)[1]
+
+
+def _are_one(posed: PosedSurface, first: Nodes, second: Nodes) -> bool:
+    """Whether both sides hang together nearby, or not at all: what is far along one piece may rightly part."""
+    if not np.isin(posed.pieces[first], posed.pieces[second]).any():
+        return True
+    way = dijkstra(posed.ways, directed=False, indices=first, limit=LONGEST_WAY, min_only=True)
+    return bool(np.isfinite(way[second]).any())
 
 
 def _sides(posed: PosedSurface, pairs: Nodes) -> tuple[Nodes, Nodes]:

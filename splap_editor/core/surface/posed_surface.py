@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from splap_editor.core.index_spaces import NodeMask, Nodes
@@ -101,6 +102,20 @@ class PosedSurface:
         kept = (starts < self.L.indices) & (moved[starts] | moved[self.L.indices]) & (self.L.data < 0.0)
         links = np.stack([starts[kept], self.L.indices[kept]], axis=1).astype(np.int32, copy=False)
         return links, *self.distances(links)
+
+    @cached_property
+    def ways(self) -> sp.csr_array:
+        """(n, n) how far apart at rest all nodes are that pull at each other, in units of s."""
+        starts = np.repeat(np.arange(self.n_nodes, dtype=np.int32), np.diff(self.L.indptr))
+        kept = starts != self.L.indices
+        pairs = np.stack([starts[kept], self.L.indices[kept]], axis=1)
+        lengths = np.maximum(_distances(self.ellipses.centers, pairs) / self.scale, np.finfo(float).tiny)
+        return sp.csr_array((lengths, (pairs[:, 0], pairs[:, 1])), shape=self.L.shape)
+
+    @cached_property
+    def pieces(self) -> NDArray[np.int32]:
+        """(n,) piece that each node is of; nothing pulls from one to another."""
+        return connected_components(self.ways, directed=False)[1]
 
     @cached_property
     def partings(self) -> tuple[NDArray[np.int32], NDArray[np.float64]]:

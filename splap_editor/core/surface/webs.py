@@ -16,6 +16,9 @@ LONGER, STRETCHED = 0.003, 1.15
 WEIGHTS = (-7.5, 0.2, 0.7, 3.6, 2.3, 2.8)
 """Of 1 and each evidence."""
 
+SURE = np.log(4.0)
+"""Odds of at least one link of a place: a false alarm is worse than a web that is missed."""
+
 _MOST_BESIDE = 20.0
 
 
@@ -28,12 +31,15 @@ class Webs(NamedTuple):
         Nodes i < j.
     longer : (W,) float64
         By how much they grew, in units of s.
+    are_sure : (W,) bool
+        Those that tell a place; the others, which lie beside, tell how large it is.
     parted : (Q, 2) int
         What rightly parted beside them, and elsewhere.
     """
 
     links: Nodes
     longer: NDArray[np.float64]
+    are_sure: NDArray[np.bool_]
     parted: Nodes
 
 
@@ -60,9 +66,10 @@ def webs(posed: PosedSurface, torn: Nodes) -> Webs:
     _, rest, moved = posed.links
     longer, parted = (moved - rest)[grown] / posed.scale, rightly_parted(posed, torn)
     if not len(links):
-        return Webs(links, longer, parted)
-    is_web = evidence(posed, links, grown, parted) @ np.array(WEIGHTS) > 0.0
-    return Webs(links[is_web], longer[is_web], parted)
+        return Webs(links, longer, np.zeros(0, bool), parted)
+    odds = evidence(posed, links, grown, parted) @ np.array(WEIGHTS)
+    is_web = odds > 0.0
+    return Webs(links[is_web], longer[is_web], odds[is_web] > SURE, parted)
 
 
 def grown_links(posed: PosedSurface) -> tuple[Nodes, NDArray[np.bool_]]:
