@@ -126,9 +126,9 @@ def _places(posed: PosedSurface, signs: _Signs, parted: Nodes) -> list[Flaw]:
             continue
         across = pairs[own]
         if signs.kind == "web":
-            # Links of the drawn-out surface on either side are among its own; the longest alone tell the sides.
+            # Links of the drawn-out surface on either side are among its own; what parted farthest tells the sides.
             about = parted_about(posed, across, parted)
-            across = about if len(about) else across[signs.longer[own] > 0.5 * size]
+            across = _farthest(posed, about if len(about) else across)
         first, second = _sides(posed, across)
         if signs.kind == "tear" and not _are_one(posed, first, second):
             continue
@@ -145,6 +145,13 @@ def _labels(posed: PosedSurface, pairs: Nodes) -> NDArray[np.integer]:
     beside = np.concatenate([posed.beside.within(marked), pairs])
     together = sp.csr_array((np.ones(len(beside), np.int8), (beside[:, 0], beside[:, 1])), shape=(n, n))
     return np.unique(connected_components(together, directed=False)[1][pairs[:, 0]], return_inverse=True)[1]
+
+
+def _farthest(posed: PosedSurface, pairs: Nodes) -> Nodes:
+    """(F, 2) those of some pairs that grew at least four fifths as much as that which grew most."""
+    rest, moved = posed.distances(pairs)
+    grown = moved - rest
+    return pairs[grown >= 0.8 * grown.max()]
 
 
 def _are_one(posed: PosedSurface, first: Nodes, second: Nodes) -> bool:

@@ -7,7 +7,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QPushButton, QSizePolicy, QVBoxLayout, QWidget
 
 from splap_editor.core.index_spaces import FileRows
-from splap_editor.engine.deformation_check import KINDS, FlawPlace
+from splap_editor.engine.deformation_check import FlawPlace
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
 from splap_editor.tools.tool_manager import ToolManager
@@ -95,11 +95,10 @@ class CheckPanel(QWidget):
         line = QWidget()
         row = QHBoxLayout(line)
         row.setContentsMargins(0, 0, 0, 0)
-        size = KINDS[place.kind][2].format(size=place.size)
-        button = QPushButton(f"{place.kind.title()}: {size}", flat=True)
+        button = QPushButton(f"{place.kind.title()}: {place.size:.3g}", flat=True)
         button.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         button.setStyleSheet("text-align: left;")
-        set_plain_tip(button, f"Bring this {place} into view")
+        set_plain_tip(button, f"Bring into view this {place}")
         button.clicked.connect(lambda: self._look_at(place.rows))
         row.addWidget(button, 1)
         cure = CURES.get(place.kind)
