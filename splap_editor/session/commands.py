@@ -1,7 +1,7 @@
 """The undoable steps: each a swap between a value before and a value after."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +18,16 @@ EDIT_BYTES = 2048
 
 @dataclass(eq=False)
 class ChangeEdit:
-    """Handles, poses, pins, graph mends or options changed."""
+    """Handles, poses, pins, graph mends or options changed; undo chooses again what was, where nothing is chosen."""
 
     scene: Scene
     before: Edit
     after: Edit
     label: str
+    _chosen: tuple[tuple[int, ...], tuple[int, ...]] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._chosen = self.scene.active_handles, self.scene.active_pins
 
     @property
     def nbytes(self) -> int:
@@ -46,6 +50,8 @@ class ChangeEdit:
     def undo(self) -> None:
         """Put the edit from before back."""
         self.scene.set_edit(self.before)
+        if not (self.scene.active_handles or self.scene.active_pins):
+            self.scene.set_active_handles(*self._chosen)
 
 
 @dataclass(eq=False)

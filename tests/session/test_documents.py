@@ -155,6 +155,19 @@ def test_an_edit_is_dirty_until_it_is_saved_and_clean_again_when_undone(desk, tm
     assert not documents.is_dirty
 
 
+def test_undo_chooses_again_what_was_chosen(desk):
+    desk.open_ply()
+    session, scene = desk.session, desk.scene
+    first = session.steps.add_handle(Region(np.zeros(3), 0.1))
+    session.steps.add_handle(Region(np.array([0.0, 0.0, 0.5]), 0.1))
+    session.history.undo()
+    assert scene.active_handles == (first.handle_id,)
+    session.steps.change_edit(scene.edit.without_handles([first.handle_id]), "Delete handle")
+    assert not scene.active_handles
+    session.history.undo()
+    assert scene.active_handles == (first.handle_id,)
+
+
 def test_what_a_session_still_has_is_lost_when_it_is_deleted_only_in_the_window(desk, tmp_path):
     desk.open_ply()
     desk.session.steps.add_pin(Region(np.zeros(3), 0.1))

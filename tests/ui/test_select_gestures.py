@@ -1,8 +1,13 @@
 """Selecting in the window, by each shape, with the modifiers, and what H and P make of it."""
 
+from time import sleep
+
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, Qt
+from PySide6.QtCore import QCoreApplication, QEvent, QPoint, QPointF, Qt
+from PySide6.QtGui import QMouseEvent
+
+from splap_editor.core.reach_options import ReachOptions
 
 SHIFT, CTRL = Qt.KeyboardModifier.ShiftModifier, Qt.KeyboardModifier.ControlModifier
 
@@ -35,6 +40,36 @@ def test_rectangle_and_lasso_of_one_outline_select_the_same(driver):
     by_lasso = driver.scene.selection
     # The lasso is filled on the pixel grid, so splats on its very edge may fall either way.
     assert (by_lasso != by_rectangle).sum() <= 0.1 * by_rectangle.sum()
+
+
+def test_a_lasso_drawn_while_frames_are_slow_loses_no_corner(driver):
+    driver.window.actions_["select.through"].trigger()
+    driver.key(Qt.Key.Key_K)
+    middle, turns = driver.surface_pixel(), np.linspace(0.0, 2.0 * np.pi, 13)
+    # A star: each corner left out takes a ray away.
+    star = [
+        middle + QPoint(round(r * np.cos(t)), round(r * np.sin(t)))
+        for t, r in zip(turns, [45, 12] * 6 + [45], strict=True)
+    ]
+    driver.drag(*star)
+    at_once = driver.scene.selection.copy()
+    assert 0 < at_once.sum() < len(at_once)
+    driver.key(Qt.Key.Key_Z, CTRL)
+    viewport, hud = driver.window.viewport, driver.window.tools.context.hud
+    viewport.frame_drawn.connect(lambda _: sleep(0.3))
+    driver.press(star[0])
+    driver.wait_frame()
+    for point in star[1:]:
+        # All of them wait for the frame to be done, as those of a quick hand do.
+        viewport.update()
+        where = QPointF(point), QPointF(viewport.mapToGlobal(point))
+        held = Qt.MouseButton.NoButton, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
+        QCoreApplication.postEvent(viewport, QMouseEvent(QEvent.Type.MouseMove, *where, *held))
+    driver.wait_frame()
+    ratio = viewport.devicePixelRatioF()
+    assert list(hud.outline) == [(point.x() * ratio, point.y() * ratio) for point in star]
+    driver.release(star[-1])
+    np.testing.assert_array_equal(driver.scene.selection, at_once)
 
 
 def test_modifiers_add_remove_and_intersect(driver):
@@ -85,6 +120,26 @@ def test_a_selection_becomes_a_handle_or_a_pin(driver, key, n_handles, n_pins):
     region = [*(handle.region for handle in edit.handles), *(pin.region for pin in edit.pins)][0]
     np.testing.assert_array_equal(region.rows, rows)
     driver.wait_idle()
+
+
+@pytest.mark.parametrize("key", [Qt.Key.Key_H, Qt.Key.Key_P])
+def test_a_selection_that_has_moved_is_held_where_it_is(driver, key):
+    driver.session.steps.change_edit(driver.scene.edit.with_options(ReachOptions(None)), "Free everything")
+    driver.click(driver.surface_pixel())
+    driver.wait_idle()
+    for pressed in (Qt.Key.Key_G, Qt.Key.Key_X, Qt.Key.Key_Period, Qt.Key.Key_5, Qt.Key.Key_Return):
+        driver.key(pressed)
+    driver.wait_idle()
+    before = driver.scene.kernels.means.copy()
+    moved = np.linalg.norm(before - driver.scene.splats.means, axis=1)
+    driver.session.steps.change_mask("selection", moved > np.quantile(moved, 0.95), "Select")
+    driver.key(key)
+    driver.wait_idle()
+    assert not driver.scene.edit.pins and len(driver.scene.edit.handles) == 2
+    assert driver.scene.edit.handles[-1].frees == (key == Qt.Key.Key_H)
+    # As a rigid body, which what has bent a little is not.
+    shift = np.linalg.norm(driver.scene.kernels.means - before, axis=1)
+    assert shift.max() < 0.1 * moved.max()
 
 
 def test_everything_else_is_pinned_in_one_action(driver):
