@@ -14,6 +14,7 @@ from splap_editor.core.splats.smallest_box import smallest_box
 _SAMPLE = 40_000
 """So many splats tell where the subject is; more cost time and move its size by less than a spacing."""
 
+_BLOCK_ROWS = 1 << 13
 _K = 8
 _FAINT = 0.25
 """Share of the median opacity below which a splat is haze wherever it lies."""
@@ -127,7 +128,11 @@ def _subject_of(points: NDArray[np.float64], progress: Progress) -> NDArray[np.b
     n = len(points)
     tree = cKDTree(points)
     progress(0.2)
-    distances, neighbors = tree.query(points, _K + 1)
+    distances, neighbors = np.empty((n, _K + 1)), np.empty((n, _K + 1), np.intp)
+    for lo in range(0, n, _BLOCK_ROWS):
+        progress(0.2 + 0.3 * lo / n)
+        block = slice(lo, lo + _BLOCK_ROWS)
+        distances[block], neighbors[block] = tree.query(points[block], _K + 1)
     progress(0.5)
     row_ends = np.arange(0, n * _K + 1, _K)
     near = sparse.csr_array((np.ones(n * _K, np.int32), neighbors[:, 1:].ravel(), row_ends), shape=(n, n))

@@ -61,6 +61,7 @@ def morton_order(points: NDArray[np.float64], progress: Progress = no_progress) 
     order = np.argsort(codes, kind="stable")
     progress(0.8)
     ordered = codes[order]
+    progress(0.9)
     tied = np.zeros(len(codes), bool)
     tied[1:] = ordered[1:] == ordered[:-1]
     tied[:-1] |= tied[1:]

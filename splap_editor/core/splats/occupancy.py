@@ -178,13 +178,17 @@ def occupancy_ellipses(
         if removed is not None:
             inert[removed] = InertReason.REMOVED
         rows = np.flatnonzero(inert == InertReason.ACTIVE)
-        rows = rows[morton_order(np.asarray(splats.means[rows], np.float64), part_of(progress, 0.4, 0.5))]
-    centers = np.ascontiguousarray(splats.means[rows], np.float64)
+        centers = np.asarray(splats.means[rows], np.float64)
+        order = morton_order(centers, part_of(progress, 0.4, 0.5))
+    progress(0.5)
+    rows, centers = rows[order], centers[order]
+    progress(0.52)
     axes, sigmas, opacities = axes[rows], sigmas[rows], np.asarray(opacities[rows], np.float64)
+    progress(0.54)
     semi_axes, normals = np.empty((len(rows), 2, 3)), np.empty((len(rows), 3))
     cutoffs = np.sqrt(-2.0 * np.log(levels[rows]))
     major = cutoffs * sigmas[:, 0]
-    for block in _blocks(len(rows), part_of(progress, 0.5, 0.8)):
+    for block in _blocks(len(rows), part_of(progress, 0.56, 0.8)):
         matrices = quats_to_matrices(np.asarray(splats.quats[rows[block]], np.float64))
         columns = np.take_along_axis(matrices.swapaxes(1, 2), axes[block, :, None].astype(int), axis=1)
         minor = np.maximum(cutoffs[block] * sigmas[block, 1], NEEDLE_FLOOR * major[block])
