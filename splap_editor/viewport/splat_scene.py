@@ -64,7 +64,7 @@ class SplatScene:
         self.edges: EdgeLines | None = None
         self._original: SplatActor | None = None
         self._rest: Glyphs | None = None
-        self._subject_rows = np.empty(0, np.int64)
+        self._subject_rows: FileRows = np.empty(0, np.int64)
         self._removed: FileMask | None = None
         self._flags = np.zeros(0, np.uint8)
         self._highlighted: FileRows | None = None
@@ -93,7 +93,7 @@ class SplatScene:
         self._rest, self._removed = glyphs, None
         subject = subject or main_subject(glyphs.means, np.asarray(colors[:, 3], np.float64) / 255.0)
         self.deformed = SplatActor(glyphs, colors, subject, by_contribution)
-        self._subject_rows = np.flatnonzero(subject.holds(glyphs.means, room=self.deformed.reach))
+        self._subject_rows = _rows_seen(subject, glyphs.means, self.deformed.reach)
         self._renderer.AddActor(self.deformed.actor)
         self._flags = np.zeros(self.deformed.n_splats, np.uint8)
         self.edges = EdgeLines(self.deformed, self._renderer)
@@ -104,7 +104,7 @@ class SplatScene:
         """Frame and clip by another subject of the same scene, and without the splats that are removed (N,)."""
         if self.deformed is None or self._rest is None:
             return
-        self._subject_rows = np.flatnonzero(subject.holds(self._rest.means, room=self.deformed.reach))
+        self._subject_rows = _rows_seen(subject, self._rest.means, self.deformed.reach)
         for actor in (self.deformed, self._original):
             if actor is not None:
                 actor.set_subject(subject, removed)
@@ -269,7 +269,7 @@ class SplatScene:
         return np.array([np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]]) if boxes else None
 
     def subject_points(self) -> NDArray[np.float64]:
-        """(n, 3) where the splats of the main subject are in the picture, world units; none without a scene."""
+        """(n, 3) where the main subject and its sparser parts are in the picture, world units; none without a scene."""
         actor = self.shown
         return np.empty((0, 3)) if actor is None else actor.means[self._subject_rows] + actor.origin
 
@@ -319,3 +319,8 @@ class SplatScene:
             self._needs_order = False
         if self._original and (needs_order or self._original.is_unordered):
             self._original.set_order(depth_order(self._original.means, direction))
+
+
+def _rows_seen(subject: MainSubject, means: NDArray[np.floating], reach: float) -> FileRows:
+    """Splats that a picture of the subject is framed by."""
+    return np.flatnonzero((subject.seen or subject).holds(means, room=reach))

@@ -201,6 +201,22 @@ def test_home_frames_the_subject_and_frame_everything_all_that_floats():
         np.testing.assert_allclose(viewport.frame().focal_point, [5.0, 0, 0], atol=0.1)
 
 
+def test_home_shows_a_sparse_part_beside_the_subject_whole():
+    # A strap, and the see-through thing that hangs on it.
+    rng = np.random.default_rng(6)
+    rod = np.column_stack([rng.uniform(-0.5, 0.5, 3000), rng.normal(size=(3000, 2)) * 0.01])
+    sheet = np.column_stack([rng.uniform(-0.4, 0.4, 700), np.zeros(700), rng.uniform(0.02, 0.82, 700)])
+    glyphs, rgba = random_splats(3700, size=0.01)
+    rgba[:, 3] = np.repeat([0.9, 0.4], [3000, 700])
+    means = np.concatenate([rod, sheet])
+    with canvas(replace(glyphs, means=means), rgba) as viewport:
+        viewport.reset_camera()
+        width, height = viewport.renderer.GetSize()
+        pixels = viewport.projection.pixels(means)
+        assert (pixels > 0).all() and (pixels < (width, height)).all()
+        assert np.ptp(pixels[:, 1]) > 0.5 * height
+
+
 def test_how_near_the_eye_may_come_follows_from_the_subject():
     glyphs, rgba, _ = _with_floaters()
     glyphs.means[-1] = [0.0, 1e5, 0.0]

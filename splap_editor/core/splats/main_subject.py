@@ -1,6 +1,6 @@
 """The main subject of a capture: where it is and how large, whatever floats about it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,9 @@ _FAINT = 0.25
 _SPARSE = 3.2
 """A splat belongs to no surface if its ``_K`` nearest lie so many times farther off than is usual."""
 
+_ROUNDS = 3
+"""So often what is usual is told anew by those that are near enough to it; it settles after two."""
+
 _MUTUAL = 4
 """A splat belongs to a surface if so many of its neighbours count it among theirs."""
 
@@ -33,6 +36,15 @@ _GAP = 0.1
 
 _SECOND = 0.8
 """Share of the subject's splats from which another clump is a subject as well."""
+
+_COHERENT = 0.07
+"""Beside the subject a splat belongs to a sparser part if its ``_K`` nearest lie within this share of the size."""
+
+_SEEN = 0.02
+"""Share of the subject's splats that a clump of a sparser part must hold to be seen as one."""
+
+_BESIDE = 1.0
+"""What goes on farther from the subject than this many times its size is no part of it: a floor, a wall."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,11 +59,15 @@ class MainSubject:
         Middle of the box, in world units.
     half_axes : (3, 3) float64
         From the middle to three faces, as world vectors at right angles, the longest first.
+    seen : MainSubject, optional
+        The same with the sparser parts beside it: what a picture of the subject shows, though the size does not go by
+        it. None where there are none.
     """
 
     size: float
     center: NDArray[np.float64]
     half_axes: NDArray[np.float64]
+    seen: "MainSubject | None" = None
 
     @property
     def corners(self) -> NDArray[np.float64]:
@@ -100,11 +116,22 @@ def main_subject(
         return MainSubject(0.0, np.zeros(3), np.zeros((3, 3)))
     centers = np.asarray(points, np.float64)
     middle = centers.mean(axis=0)
-    sample = _sample(centers - middle, np.asarray(opacities, np.float64), part_of(progress, 0.0, 0.6))
-    progress(0.6)
-    kept = sample[_subject_of(sample, part_of(progress, 0.6, 0.9))] if len(sample) > 4 * _K else sample
-    progress(0.9)
-    center, half_axes = smallest_box(kept, part_of(progress, 0.9, 1.0))
+    sample = _sample(centers - middle, np.asarray(opacities, np.float64), part_of(progress, 0.0, 0.4))
+    if len(sample) <= 4 * _K:
+        return _boxed(sample, middle, progress)
+    near = _nearest(sample, part_of(progress, 0.4, 0.6))
+    chosen = _subject_of(sample, near, part_of(progress, 0.6, 0.8))
+    subject = _boxed(sample[chosen], middle, part_of(progress, 0.8, 0.9))
+    is_near = subject.holds(sample + middle, room=_BESIDE * subject.size)
+    beside = _parts_beside(sample, near, chosen, subject.size, is_near)
+    if not beside.any():
+        return subject
+    return replace(subject, seen=_boxed(sample[chosen | beside], middle, part_of(progress, 0.9, 1.0)))
+
+
+def _boxed(points: NDArray[np.float64], middle: NDArray[np.float64], progress: Progress) -> MainSubject:
+    """The smallest box about points that are given from a middle."""
+    center, half_axes = smallest_box(points, progress)
     return MainSubject(2.0 * float(np.linalg.norm(half_axes[0])), center + middle, half_axes)
 
 
@@ -123,8 +150,16 @@ def _sample(points: NDArray[np.float64], opacities: NDArray[np.float64], progres
     return points[order[np.argsort(opacities[order], kind="stable")[::step]]]
 
 
-def _subject_of(points: NDArray[np.float64], progress: Progress) -> NDArray[np.bool_]:
-    """Which points the subject is made of."""
+@dataclass(frozen=True, eq=False)
+class _Nearest:
+    """The ``_K`` nearest of each point: as a graph, how far the last is, and how many count the point among theirs."""
+
+    graph: sparse.csr_array
+    spacings: NDArray[np.float64]
+    n_mutual: NDArray[np.integer]
+
+
+def _nearest(points: NDArray[np.float64], progress: Progress) -> _Nearest:
     n = len(points)
     tree = cKDTree(points)
     progress(0.2)
@@ -135,18 +170,22 @@ def _subject_of(points: NDArray[np.float64], progress: Progress) -> NDArray[np.b
         distances[block], neighbors[block] = tree.query(points[block], _K + 1)
     progress(0.5)
     row_ends = np.arange(0, n * _K + 1, _K)
-    near = sparse.csr_array((np.ones(n * _K, np.int32), neighbors[:, 1:].ravel(), row_ends), shape=(n, n))
-    spacings = distances[:, -1]
-    is_solid = (spacings <= _SPARSE * np.median(spacings)) & (near.multiply(near.T).sum(axis=1) >= _MUTUAL)
-    where = np.flatnonzero(is_solid)
-    _, labels = connected_components(near[where][:, where], directed=False)
+    graph = sparse.csr_array((np.ones(n * _K, np.int32), neighbors[:, 1:].ravel(), row_ends), shape=(n, n))
+    return _Nearest(graph, distances[:, -1], graph.multiply(graph.T).sum(axis=1))
+
+
+def _subject_of(points: NDArray[np.float64], near: _Nearest, progress: Progress) -> NDArray[np.bool_]:
+    """Which points the subject is made of."""
+    n = len(points)
+    where = np.flatnonzero(_is_solid(near))
+    _, labels = connected_components(near.graph[where][:, where], directed=False)
     is_part = np.bincount(labels, minlength=1) >= max(_K, _SPECK * len(where))
     where, labels = where[is_part[labels]], labels[is_part[labels]]
     chosen = np.zeros(n, bool)
     least = 1.0
     while len(where):
-        progress(0.9)
-        group = _grown(points[where], labels)
+        progress(0.5)
+        group = _grown(points[where], labels, labels == np.argmax(np.bincount(labels)))
         if group.sum() < least:
             break
         least = max(least, _SECOND * group.sum())
@@ -156,9 +195,47 @@ def _subject_of(points: NDArray[np.float64], progress: Progress) -> NDArray[np.b
     return chosen if chosen.any() else ~chosen
 
 
-def _grown(points: NDArray[np.float64], labels: NDArray[np.integer]) -> NDArray[np.bool_]:
-    """Which points are of the largest clump, or of one close to it, or close to those."""
-    inside = labels == np.argmax(np.bincount(labels))
+def _is_solid(near: _Nearest) -> NDArray[np.bool_]:
+    """Which points lie as close as is usual on a surface, and what is usual is told by those that do: not by haze."""
+    is_solid = np.ones(len(near.spacings), bool)
+    for _ in range(_ROUNDS):
+        usual = np.median(near.spacings[is_solid])
+        is_solid = (near.spacings <= _SPARSE * usual) & (near.n_mutual >= _MUTUAL)
+        if not is_solid.any():
+            break
+    return is_solid
+
+
+def _parts_beside(
+    points: NDArray[np.float64],
+    near: _Nearest,
+    chosen: NDArray[np.bool_],
+    size: float,
+    is_near: NDArray[np.bool_],
+) -> NDArray[np.bool_]:
+    """Which points are of parts that hang on to the chosen ones, though sparser than they: thin, dark, see-through.
+
+    Haze is too far apart for that, and a clump that floats elsewhere does not come close.
+    """
+    is_coherent = ~chosen & (near.spacings <= _COHERENT * size) & (near.n_mutual >= _MUTUAL)
+    where = np.flatnonzero(is_coherent)
+    _, labels = connected_components(near.graph[where][:, where], directed=False)
+    n_all = np.bincount(labels, minlength=1)
+    n_near = np.bincount(labels, is_near[where], minlength=1)
+    is_part = (n_all >= max(_K, _SEEN * chosen.sum())) & (n_near >= 0.9 * n_all)
+    beside = np.zeros(len(points), bool)
+    if not is_part.any():
+        return beside
+    where, labels = where[is_part[labels]], labels[is_part[labels]]
+    all_ = np.concatenate([np.flatnonzero(chosen), where])
+    # The chosen ones are one clump, whose label comes before those of the parts.
+    begun = np.concatenate([np.zeros(int(chosen.sum()), labels.dtype), labels + 1])
+    beside[all_[_grown(points[all_], begun, begun == 0)]] = True
+    return beside & ~chosen
+
+
+def _grown(points: NDArray[np.float64], labels: NDArray[np.integer], inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which points are inside, or of a clump close to those, or close to one that is."""
     newest = inside
     while True:
         center = points[inside].mean(axis=0)

@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from splap_editor.core.splats.main_subject import main_subject
+from splap_editor.core.splats.smallest_box import smallest_box
 from splap_editor.io.ply import read_ply
 from splap_editor.io.sample_maker import STYLES, shape_sample
 from splap_editor.resources import resource
@@ -73,6 +75,56 @@ def test_floaters_leave_the_subject(name, floaters):
     found = main_subject(turn.apply(points), np.concatenate([opacities, rng.uniform(0.02, 0.6, n)]))
     assert abs(found.size / clean.size - 1.0) < 0.05
     assert np.linalg.norm(turn.inv().apply(found.center) - clean.center) < 0.05 * clean.size
+    assert (found.seen or found).size < 1.05 * clean.size
+
+
+def _beside(dense, sparse, *, every, gap=0.01):
+    """A thing as dense as a strap, and one as large of few, half-transparent splats at its side, so far off it."""
+    rng = np.random.default_rng(4)
+    (means, opacities), clean = CAPTURES[dense], CLEAN[dense]
+    means = np.concatenate([means, means + rng.normal(size=means.shape) * 0.002 * clean.size])
+    few, faint = CAPTURES[sparse]
+    few, faint = few[::every], 0.5 * faint[::every]
+    few = clean.size / np.ptp(few, axis=0).max() * (few - few.mean(axis=0)) + clean.center
+    axis = clean.half_axes[1] / np.linalg.norm(clean.half_axes[1])
+    tree = cKDTree(means)
+    # From outside inwards until they are as near as wanted.
+    for away in np.arange(1.5, 0.0, -0.01) * clean.size:
+        if tree.query(few + away * axis)[0].min() <= gap * clean.size:
+            break
+    few += away * axis
+    points = np.concatenate([means, few])
+    return points, np.concatenate([opacities, opacities, faint]), np.arange(len(means), len(points))
+
+
+@pytest.mark.parametrize("floaters", [None, _near_haze, _clusters, _one_cluster])
+@pytest.mark.parametrize(
+    ("dense", "sparse", "every"), [("windmill_2dgs.ply", "bench thin", 8), ("comb trained", "bench_2dgs.ply", 16)]
+)
+def test_a_sparse_part_beside_a_dense_one_is_seen_and_changes_no_size(dense, sparse, every, floaters):
+    rng = np.random.default_rng(8)
+    means, opacities, part = _beside(dense, sparse, every=every)
+    clean, points = CLEAN[dense], means
+    if floaters is not None:
+        n = round(SHARE / (1.0 - SHARE) * len(means))
+        points = np.concatenate([means, clean.center + clean.size * floaters(n, rng)])
+        opacities = np.concatenate([opacities, rng.uniform(0.02, 0.6, n)])
+    found = main_subject(points, opacities)
+    assert abs(found.size / clean.size - 1.0) < 0.05
+    assert not found.holds(means[part], room=0.05 * clean.size).all()
+    # Splats at the end of a thin part have few neighbours; what is about the subject in the picture has room for them.
+    assert found.seen.holds(means[part], room=0.02 * clean.size).mean() > 0.98
+    # Both and no more.
+    assert found.seen.size < 1.05 * 2.0 * np.linalg.norm(smallest_box(means)[1][0])
+
+
+def test_what_goes_on_far_beyond_or_stands_apart_is_no_part():
+    means, _ = CAPTURES["bench thin"]
+    rng = np.random.default_rng(3)
+    floor = np.column_stack([rng.uniform(-5.0, 5.0, (3000, 2)), np.full(3000, means[:, 2].min() - 0.01)])
+    assert main_subject(np.concatenate([means, floor]), np.ones(len(means) + 3000)).seen is None
+    apart, faint, _ = _beside("comb trained", "bench_2dgs.ply", every=16, gap=0.2)
+    assert main_subject(apart, faint).seen is None
 
 
 @pytest.mark.parametrize("name", CAPTURES)
