@@ -163,6 +163,11 @@ class Compilation:
         """Whether nothing is left to do."""
         return not self._left
 
+    @property
+    def is_running(self) -> bool:
+        """Whether one of its processes still lives."""
+        return any(process.poll() is None for process in self._processes)
+
     def keep(self) -> None:
         """Note for later starts that everything is compiled, unless something could not be."""
         if self.is_done and not self._failed:

@@ -1,6 +1,7 @@
 """Rules of the house that no linter knows, read off the source: of tests, of compiled loops."""
 
 import ast
+from functools import cache
 from pathlib import Path
 
 import splap_editor
@@ -10,8 +11,11 @@ CHECKS = ("raises", "warns", "waitUntil", "waitSignal", "run_until")
 """Calls that fail a test, beside those named assert…"""
 
 
-def modules(folder):
-    return {path: ast.parse(path.read_text(encoding="utf-8")) for path in sorted(folder.rglob("*.py"))}
+@cache
+def modules(folder, word=""):
+    """Syntax trees of the modules in a folder that hold a word."""
+    texts = {path: path.read_text(encoding="utf-8") for path in sorted(folder.rglob("*.py"))}
+    return {path: ast.parse(text) for path, text in texts.items() if word in text}
 
 
 def functions(tree):
@@ -20,7 +24,10 @@ def functions(tree):
 
 def called(node):
     """Last name of what a call calls."""
-    return ast.unparse(node.func).rpartition(".")[2] if isinstance(node, ast.Call) else ""
+    match node:
+        case ast.Call(func=ast.Name(id=name) | ast.Attribute(attr=name)):
+            return name
+    return ""
 
 
 def is_check(call, checkers):
@@ -84,8 +91,35 @@ def test_no_test_leaves_early():
     assert left == []
 
 
+def hidden_names(tree):
+    """Lines and names, of one underscore, that are neither a module's own nor an object's own."""
+    for node in ast.walk(tree):
+        names = []
+        match node:
+            case ast.Attribute(value=ast.Name(id="self" | "cls")):
+                pass
+            case ast.Attribute(value=ast.Name(id="os"), attr="_exit"):
+                pass
+            case ast.Attribute(attr=name):
+                names = [name]
+            case ast.ImportFrom(module=module, names=aliases):
+                names = [*(module or "").split("."), *(alias.name for alias in aliases)]
+            case ast.Call(args=arguments) if called(node) in ("setattr", "getattr", "hasattr", "delattr"):
+                texts = [each.value for each in arguments if isinstance(each, ast.Constant)]
+                names = [part for text in texts if isinstance(text, str) for part in text.split(".")]
+        yield from ((node.lineno, name) for name in names if name.startswith("_") and not name.startswith("__"))
+
+
+def test_no_test_reads_what_is_private():
+    trees = modules(TESTS).items()
+    found = [(path.name, line, name) for path, tree in trees for line, name in hidden_names(tree)]
+    assert found == []
+    sample = "x._a; self._b; self.x._c; os._exit; from y import _d; m.setattr('z._e', 1); getattr(z, '_f'); x.__g__"
+    assert [name for _, name in hidden_names(ast.parse(sample.replace("; ", "\n")))] == ["_d", "_a", "_c", "_e", "_f"]
+
+
 def test_each_compiled_loop_says_what_it_does():
-    trees = modules(Path(splap_editor.__file__).parent)
+    trees = modules(Path(splap_editor.__file__).parent, "njit")
     loops = [
         (path, function)
         for path, tree in trees.items()

@@ -55,18 +55,6 @@ def test_the_options_of_every_part_of_an_edit_go_by_their_names():
     assert set(splap.options.__all__) >= set(splap.options.GROUPS)
 
 
-@pytest.mark.parametrize("method", ["arap", "bbw"])
-def test_one_call_writes_the_file_that_its_steps_write(method, tmp_path):
-    source = resource("samples", "tube.ply")
-    file = splap.read_ply(source)
-    top = np.asarray(file.splats.means, np.float64)[np.argmax(file.splats.means[:, 2])]
-    handle = splap.Handle(center=tuple(top.tolist()), radius=0.1, translate=(0.0, 0.3, 0.0))
-    edit = splap.Edit([handle], [splap.Pin(rows=(3, 4))], method)
-    splap.deform(source, edit, tmp_path / "one.ply")
-    splap.write_ply(tmp_path / "steps.ply", file, splap.bind(splap.prepare(file), edit).pose().splats)
-    assert (tmp_path / "one.ply").read_bytes() == (tmp_path / "steps.ply").read_bytes()
-
-
 def test_a_set_of_handles_is_bound_once_and_posed_anew_at_will():
     file = splap.read_ply(resource("samples", "tube.ply"))
     means = np.asarray(file.splats.means, np.float64)

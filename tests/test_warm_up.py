@@ -23,7 +23,7 @@ def made(*seconds: float, later: tuple[float, ...] = ()) -> list[Loop]:
     return first + [Loop(f"later{i}", "()", cost, i // 2, False) for i, cost in enumerate(later)]
 
 
-def compilation(wanted, answer="done") -> tuple[Compilation, list[float]]:
+def compilation(wanted, answer="done", program=ANSWERS) -> tuple[Compilation, list[float]]:
     shares: list[float] = []
     told = threading.Event()
 
@@ -32,7 +32,7 @@ def compilation(wanted, answer="done") -> tuple[Compilation, list[float]]:
         if work.is_done:
             told.set()
 
-    work = Compilation(tell, wanted, (sys.executable, "-c", ANSWERS.format(answer)))
+    work = Compilation(tell, wanted, (sys.executable, "-c", program.format(answer)))
     assert work.share == 0.0 and not work.is_done
     work.start(1)
     work.start(2)
@@ -73,10 +73,8 @@ def test_only_a_whole_compilation_is_kept(answer, kept):
 
 
 def test_a_process_that_ends_is_not_waited_for():
-    work = Compilation(lambda: None, made(1.0, 2.0), (sys.executable, "-c", "pass"))
-    work.start(1)
-    work._threads[0].join(60)
-    assert work.is_done
+    work, _ = compilation(made(1.0, 2.0), program="pass")
+    assert work.is_done and not work.is_running
     work.keep()
     assert not is_warm()
 

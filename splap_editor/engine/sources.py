@@ -19,13 +19,14 @@ def source_hash(*modules: str) -> str:
     in a process. What the package depends on (numpy, scipy, …) does not count.
     """
     digest = hashlib.blake2b(digest_size=16)
-    for module in sorted(_closure(frozenset(modules))):
-        digest.update(module.encode() + b"\0" + _source(module).encode() + b"\0")
+    for module in sorted(with_imports(frozenset(modules))):
+        digest.update(module.encode() + b"\0" + source_text(module).encode() + b"\0")
     return digest.hexdigest()
 
 
 @cache
-def _closure(modules: frozenset[str]) -> frozenset[str]:
+def with_imports(modules: frozenset[str]) -> frozenset[str]:
+    """Some modules, and all of this package that they import, directly or not."""
     found: set[str] = set()
     waiting = list(modules)
     while waiting:
@@ -40,7 +41,7 @@ def _closure(modules: frozenset[str]) -> frozenset[str]:
 def _imported(module: str) -> frozenset[str]:
     """Modules of this package that a module imports, anywhere in it."""
     found = set()
-    for name, in_lines, in_line in _IMPORT.findall(_source(module)):
+    for name, in_lines, in_line in _IMPORT.findall(source_text(module)):
         found.add(name)
         if _spec(name).submodule_search_locations is not None:
             members = (member.split("#")[0].split(" as ")[0].strip() for member in (in_lines or in_line).split(","))
@@ -49,7 +50,7 @@ def _imported(module: str) -> frozenset[str]:
 
 
 @cache
-def _source(module: str) -> str:
+def source_text(module: str) -> str:
     """Text of a module, from its file or from an archive that holds it."""
     loader = _spec(module).loader
     assert isinstance(loader, InspectLoader)

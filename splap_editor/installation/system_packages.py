@@ -61,10 +61,11 @@ def needs() -> tuple[Need, ...]:
 def missing(uses: Iterable[str]) -> list[Need]:
     """Those of some uses whose library the loader does not find."""
     uses = set(uses)
-    return [need for need in needs() if need.use in uses and need.library and not _loads(need.library)]
+    return [need for need in needs() if need.use in uses and need.library and not loads(need.library)]
 
 
-def _loads(library: str) -> bool:
+def loads(library: str) -> bool:
+    """Whether the loader finds a library."""
     try:
         ctypes.CDLL(library)
     except OSError:

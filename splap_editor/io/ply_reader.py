@@ -14,7 +14,7 @@ from splap_editor.io.ply_header import LONGEST_HEADER, PlyError, PlyHeader, ply_
 from splap_editor.io.ply_table import PlyTable
 from splap_editor.io.regular_file import open_regular
 
-_READ_BYTES = 1 << 20
+READ_BYTES = 1 << 20
 """Read at a time: little enough to be still in the cache when the rows are glanced at."""
 
 
@@ -87,8 +87,8 @@ def _read_body(
         rows = table.rows
         start = table.offset_of(rows)
     n_seen = 0
-    for lo in range(0, len(body), _READ_BYTES):
-        wanted = body[lo : lo + _READ_BYTES]
+    for lo in range(0, len(body), READ_BYTES):
+        wanted = body[lo : lo + READ_BYTES]
         if file.readinto(wanted.data) != len(wanted):
             raise PlyError(f"{name} became shorter while it was read. Open it again once it is written.")
         hi = lo + len(wanted)

@@ -13,6 +13,11 @@ class Signal:
     def __init__(self) -> None:
         self._listeners: list[Callable[..., Any]] = []
 
+    @property
+    def listeners(self) -> tuple[Callable[..., Any], ...]:
+        """Who is called, in this order."""
+        return tuple(self._listeners)
+
     def connect(self, listener: Callable[..., Any]) -> Callable[..., Any]:
         """Add a listener and return it."""
         self._listeners.append(listener)
@@ -25,5 +30,5 @@ class Signal:
 
     def emit(self, *values: Any) -> None:
         """Call every listener with ``values``."""
-        for listener in tuple(self._listeners):
+        for listener in self.listeners:
             listener(*values)

@@ -446,7 +446,7 @@ class MainWindow(FileDrop, QMainWindow):
         """Ask about an edit that would be lost; then stop the work and free the picture."""
         if not self._may_close and self.documents.would_lose:
             event.ignore()
-            self.files.leave_edit(self._close_for_good)
+            self.files.leave_edit(self.close_for_good)
             return
         settings = QSettings()
         settings.setValue("window/geometry", self.saveGeometry())
@@ -467,9 +467,10 @@ class MainWindow(FileDrop, QMainWindow):
     def leave_at_once(self) -> None:
         """Close without asking, since nobody may be there to answer; its edit is kept for the next start."""
         self._keeps_edit = True
-        self._close_for_good()
+        self.close_for_good()
 
-    def _close_for_good(self) -> None:
+    def close_for_good(self) -> None:
+        """Close without asking: whoever uses it has answered already."""
         self._may_close = True
         self.close()
 

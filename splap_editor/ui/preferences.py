@@ -57,7 +57,7 @@ class PreferenceStore:
     def __init__(self, session: Session, view: SceneView, context: ToolContext) -> None:
         self.changed = Signal()
         self._session, self._view, self._context = session, view, context
-        self.held = _read()
+        self.held = kept_preferences()
         self._apply()
 
     def set(self, held: Preferences) -> None:
@@ -95,7 +95,7 @@ class PreferenceStore:
         self._view.preferred_up = UPS[held.up]
 
 
-def _read() -> Preferences:
+def kept_preferences() -> Preferences:
     """What was remembered; anything that makes no sense is left at its default."""
     settings, held = QSettings(), Preferences()
     for field in fields(held):

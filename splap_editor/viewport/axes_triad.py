@@ -50,7 +50,7 @@ class AxesTriad:
             self._renderer.RemoveActor(actor)
         self._balls.close()
 
-    def _ends(self, projection: Projection) -> NDArray[np.float64]:
+    def ends(self, projection: Projection) -> NDArray[np.float64]:
         """(6, 3) ends +X +Y +Z -X -Y -Z: pixels from the top left, and height towards the viewer in pixels."""
         scale = self.scale
         turned = _ENDS @ self.axes @ projection.view_from_world[:3, :3].T * [1.0, -1.0, 1.0] * _ARM_PX * scale
@@ -60,7 +60,7 @@ class AxesTriad:
         """Unit axis (3,) whose end is under the cursor, the nearer to the viewer of two; None beside all."""
         self.hovered = None
         if self.is_shown:
-            ends = self._ends(projection)
+            ends = self.ends(projection)
             near = np.hypot(ends[:, 0] - x, ends[:, 1] - y) <= 0.65 * _BALL_PX * self.scale
             if near.any():
                 self.hovered = int(np.argmax(np.where(near, ends[:, 2], -np.inf)))
@@ -74,7 +74,7 @@ class AxesTriad:
             self._balls.clear()
             return
         self._look_at_pixels(projection)
-        ends = self._ends(projection) * [1.0, -1.0, 1.0] + [0.0, projection.height, 0.0]
+        ends = self.ends(projection) * [1.0, -1.0, 1.0] + [0.0, projection.height, 0.0]
         center = 0.5 * (ends[0] + ends[3])
         for line, letter, end in zip(self._lines, self._letters, ends[:3], strict=True):
             set_points(line.GetMapper().GetInput(), np.array([center, end]))

@@ -53,7 +53,7 @@ def _counting_sort_plain(means, direction, order):
     order[:] = np.argsort(behind.astype(np.uint16), kind="stable")
 
 
-_counting_sort = TwofoldLoop(_counting_sort_compiled, _counting_sort_plain)
+counting_sort = TwofoldLoop(_counting_sort_compiled, _counting_sort_plain)
 
 
 def depth_order(means: NDArray[np.float32], direction: NDArray[np.floating]) -> RowsByPlace:
@@ -83,5 +83,5 @@ def depth_order(means: NDArray[np.float32], direction: NDArray[np.floating]) -> 
     if means.ndim != 2 or means.shape[1] != 3 or means.dtype != np.float32 or not means.flags.c_contiguous:
         raise ValueError(f"means must be a C-contiguous (N, 3) float32 array, got {means.shape} {means.dtype}")
     order = np.empty(len(means), np.int32)
-    _counting_sort(means, np.ascontiguousarray(direction, np.float32), order)
+    counting_sort(means, np.ascontiguousarray(direction, np.float32), order)
     return order

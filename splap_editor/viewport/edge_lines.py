@@ -138,6 +138,11 @@ class EdgeLines:
             chosen &= self._ranks < most / count
         self._draw(chosen)
 
+    @property
+    def colors(self) -> NDArray[np.uint8]:
+        """(E, 3) colour of each edge."""
+        return self._rgba[:, :3]
+
     def hide(self) -> None:
         """Draw no edges."""
         self.show(np.empty((0, 2), np.int32), np.zeros(3, np.uint8))
@@ -146,7 +151,7 @@ class EdgeLines:
         """The same edges between the same splats in another window, so many pixels wide."""
         twin = EdgeLines(splats, renderer)
         twin.near, twin.fade, twin.background = self.near, self.fade, self.background
-        twin.show(self._edges, self._rgba[:, :3], width_px)
+        twin.show(self._edges, self.colors, width_px)
         return twin
 
     def refresh(self, projection: Projection, quality: FrameQuality | None = None) -> None:

@@ -98,7 +98,7 @@ def _hits_plain(means, axes_u, axes_v, shape, colors, flags, scale, cut, start, 
     return len(found)
 
 
-_hits = TwofoldLoop(_hits_compiled, _hits_plain)
+ray_hits = TwofoldLoop(_hits_compiled, _hits_plain)
 
 
 def _all_hits(*arguments):
@@ -106,7 +106,7 @@ def _all_hits(*arguments):
     room = 1024
     while True:
         rows, hits = np.empty(room, np.int64), np.empty((room, 2), np.float32)
-        n = _hits(*arguments, rows, hits)
+        n = ray_hits(*arguments, rows, hits)
         if n <= room:
             return rows[:n], hits[:n, 0], hits[:n, 1]
         room = n

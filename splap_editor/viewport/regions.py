@@ -41,7 +41,7 @@ def _project_plain(means, colors, flags, cut, clip, width, height, screen):
     screen[:, 2] = np.where(seen, depth, np.float32(np.nan))
 
 
-_project = TwofoldLoop(_project_compiled, _project_plain)
+project = TwofoldLoop(_project_compiled, _project_plain)
 
 
 def _local_matrices(actor: SplatActor, projection: Projection) -> NDArray[np.float32]:
@@ -65,7 +65,7 @@ def screen_points(actor: SplatActor, projection: Projection) -> NDArray[np.float
     """
     screen = np.empty((actor.n_splats, 3), np.float32)
     size = np.float32(projection.width), np.float32(projection.height)
-    _project(actor.means, actor.colors, actor.flags, actor.cut_byte, _local_matrices(actor, projection), *size, screen)
+    project(actor.means, actor.colors, actor.flags, actor.cut_byte, _local_matrices(actor, projection), *size, screen)
     return screen
 
 
@@ -147,7 +147,7 @@ def _near_path_compiled(screen, path, radius, inside):
                 break
 
 
-_near_path = TwofoldLoop(_near_path_compiled, _near_path_plain)
+near_path = TwofoldLoop(_near_path_compiled, _near_path_plain)
 
 
 def in_brush(screen: NDArray[np.float32], path: ArrayLike, radius_px: float) -> FileMask:
@@ -156,7 +156,7 @@ def in_brush(screen: NDArray[np.float32], path: ArrayLike, radius_px: float) -> 
     if path.ndim != 2 or path.shape[1] != 2 or not len(path):
         raise ValueError(f"path must have shape (K, 2) with K >= 1, got {path.shape}")
     inside = np.empty(len(screen), bool)
-    _near_path(screen, path, float(radius_px), inside)
+    near_path(screen, path, float(radius_px), inside)
     return inside
 
 
@@ -251,7 +251,7 @@ def _depth_grid_compiled(
                         grid[r, c] = z
 
 
-_depth_grid = TwofoldLoop(_depth_grid_compiled, _depth_grid_plain)
+depth_grid = TwofoldLoop(_depth_grid_compiled, _depth_grid_plain)
 
 
 def _keep_nearest(screen, grid, slack, left, top, inside):
@@ -304,7 +304,7 @@ def visible_only(
     columns, rows = np.maximum((high - low) / _CELL_PX + 1, 1).astype(int)
     grid = np.full((rows, columns), np.inf, np.float32)
     is_ellipses = actor.look.mode is DisplayMode.ELLIPSES
-    _depth_grid(
+    depth_grid(
         screen,
         actor.axes_u,
         actor.axes_v,

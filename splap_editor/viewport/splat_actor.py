@@ -64,7 +64,7 @@ def _mix_plain(colors, tints, mixed):
     mixed[:, 3] = colors[:, 3]
 
 
-_mix = TwofoldLoop(_mix_compiled, _mix_plain)
+mix_colors = TwofoldLoop(_mix_compiled, _mix_plain)
 
 
 Tint = tuple[float, float, float, float]
@@ -297,6 +297,11 @@ class SplatActor:
         self._untinted[:] = colors
         self._mix_tints()
 
+    @property
+    def tints(self) -> NDArray[np.uint8] | None:
+        """(N, 4) colours laid over the splats, the fourth their share; None where none are."""
+        return self._tints
+
     def set_tints(self, tints: NDArray[np.uint8] | None) -> None:
         """Lay a colour over each splat: (N, 4) uint8, the fourth the share of it; None takes all away."""
         self._tints = None if tints is None else np.array(tints, np.uint8)
@@ -310,9 +315,9 @@ class SplatActor:
         self._modified("flags")
 
     @property
-    def is_unordered(self) -> bool:
-        """Whether it is drawn in file order."""
-        return self._order is None
+    def order(self) -> RowsByPlace | None:
+        """(N,) rows as they are drawn, farthest first; None: in file order."""
+        return self._order
 
     def set_order(self, order: RowsByPlace | None) -> None:
         """Draw in this order, a permutation (N,) of the rows, farthest first; None: file order."""
@@ -451,5 +456,5 @@ class SplatActor:
         if self._tints is None:
             self.colors[:] = self._untinted
         else:
-            _mix(self._untinted, self._tints, self.colors)
+            mix_colors(self._untinted, self._tints, self.colors)
         self._modified("colors")

@@ -317,7 +317,7 @@ class SplatScene:
         if needs_order:
             deformed.set_order(depth_order(deformed.means, direction))
             self._needs_order = False
-        if self._original and (needs_order or self._original.is_unordered):
+        if self._original and (needs_order or self._original.order is None):
             self._original.set_order(depth_order(self._original.means, direction))
 
 

@@ -165,7 +165,7 @@ def converged(case: Case) -> tuple[float, NDArray[np.float64]]:
 
 def plain(case: Case, exact: NDArray[np.float64], n_iterations: int, ours: float) -> None:
     """Plain alternation on the same energy."""
-    problem = case.deformer()._problem
+    problem = case.deformer().problem
     pose = Pose.of_rest(problem.rest)
     problem.hold(pose, case.transforms())
     factoring = seconds(lambda: problem.position_factor)

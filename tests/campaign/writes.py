@@ -53,11 +53,13 @@ class Hook:
     def __getattr__(self, name: str) -> object:
         return getattr(self._os, name)
 
-    def _is_due(self) -> bool:
+    def is_due(self) -> bool:
+        """Whether this call is the one to fail; it is counted."""
         self.calls += 1
         return self.calls == self.at
 
-    def _strike(self) -> None:
+    def strike(self) -> None:
+        """Fail in the way that was asked for."""
         if self.way == "failed write":
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         if self.way == "power loss" and self.before_rename is not None:
@@ -75,20 +77,20 @@ class Hook:
 
     def fsync(self, handle: int) -> None:
         """Remember what is safe."""
-        if self._is_due():
-            self._strike()
+        if self.is_due():
+            self.strike()
         held = self._os.fstat(handle)
         self.n_synced[held.st_ino] = held.st_size
 
     def replace(self, source: Path, target: Path) -> None:
         """Rename, and remember what was there."""
-        if self._is_due():
-            self._strike()
+        if self.is_due():
+            self.strike()
         target = Path(target)
         self.before_rename = target, target.read_bytes() if target.exists() else None
         self._os.replace(source, target)
-        if self._is_due():
-            self._strike()
+        if self.is_due():
+            self.strike()
 
 
 class HookedFile:
@@ -112,9 +114,9 @@ class HookedFile:
         piece = max(len(view) // 8, 1)
         for lo in range(0, len(view), piece):
             part = view[lo : lo + piece]
-            if self._hook._is_due():
+            if self._hook.is_due():
                 self._file.write(part[: len(part) // 2])
-                self._hook._strike()
+                self._hook.strike()
             self._file.write(part)
         return len(view)
 

@@ -9,8 +9,8 @@ from splap_editor.engine.sources import source_hash
 
 def changed(monkeypatch, module):
     """Hashes as if a line had been added to a module."""
-    held = sources._source
-    monkeypatch.setattr(sources, "_source", lambda name: held(name) + ("\n# more\n" if name == module else ""))
+    held = sources.source_text
+    monkeypatch.setattr(sources, "source_text", lambda name: held(name) + ("\n# more\n" if name == module else ""))
 
 
 def test_a_change_of_a_module_that_is_called_changes_the_hash(monkeypatch):
@@ -22,7 +22,7 @@ def test_a_change_of_a_module_that_is_called_changes_the_hash(monkeypatch):
 
 
 def test_the_closure_holds_what_is_imported_and_no_more():
-    found = sources._closure(frozenset({"splap_editor.core.arap.binding"}))
+    found = sources.with_imports(frozenset({"splap_editor.core.arap.binding"}))
     assert {"splap_editor.core.arap.minimiser", "splap_editor.core.linear_solvers"} <= found
     assert not any(name.startswith(("splap_editor.core.bbw", "splap_editor.io")) for name in found)
     assert all(choice.module not in found for choice in list(ARAP_SOLVERS.values())[1:]), (

@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from splap_editor.cli import main
-from splap_editor.installation import desktop_entry
 from splap_editor.installation.desktop_entry import SESSION_TYPE, TYPES, integrate, remove
 from splap_editor.io.formats.table import FORMATS
 from splap_editor.io.session_file import SUFFIX
@@ -73,10 +72,11 @@ def test_a_desktop_takes_the_types_and_forgets_them(tmp_path):
     assert not left.exists() or not any(each.name in left.read_text() for each in TYPES if each.comment)
 
 
-def test_a_path_with_marks_of_the_format_comes_through(monkeypatch):
+def test_a_path_with_marks_of_the_format_comes_through(monkeypatch, tmp_path):
     python = Path('/opt/my "tools" 100%/$x/bin/python')
     monkeypatch.setattr(sys, "executable", str(python))
-    command = desktop_entry._command()
+    starter = integrate(tmp_path)[0].read_text(encoding="utf-8")
+    command = re.search("^Exec=(.*) %f$", starter, re.MULTILINE)[1]
     # A reader takes off the file's escapes, then the quotes with theirs and the doubled per cent.
     quoted = re.match(r'"((?:[^"\\]|\\.)*)"', command.replace("\\\\", "\\"))[1]
     assert re.sub(r"\\(.)", r"\1", quoted).replace("%%", "%") == str(python)

@@ -17,8 +17,8 @@ START = """
 import sys
 from splap_editor.installation import system_packages
 lacking = set(sys.argv[1].split())
-loads = system_packages._loads
-system_packages._loads = lambda name: name not in lacking and loads(name)
+loads = system_packages.loads
+system_packages.loads = lambda name: name not in lacking and loads(name)
 from splap_editor.cli import main
 code = main(sys.argv[2:])
 assert not {"PySide6", "vtkmodules", "numba"} & set(sys.modules), "refused too late"
@@ -51,7 +51,7 @@ def test_a_long_list_of_missing_libraries_stays_one_sentence():
 
 def test_pictures_need_less_than_the_window(monkeypatch):
     assert "libEGL.so.1" in sentence(start("render", "absent.ply", "-o", "out.png", lacking="libEGL.so.1"))
-    monkeypatch.setattr(system_packages, "_loads", lambda name: name != "libglib-2.0.so.0")
+    monkeypatch.setattr(system_packages, "loads", lambda name: name != "libglib-2.0.so.0")
     check_picture()
 
 

@@ -104,7 +104,7 @@ def test_activated_opacities_outside_0_to_1_are_found(tmp_path):
 @pytest.mark.parametrize("row", [0, 1, 24, 49])
 @pytest.mark.parametrize("n_bytes", [1, 70, 92, 200, 10**6])
 def test_no_row_escapes_the_look_at_blocks(row, n_bytes, tmp_path, monkeypatch):
-    monkeypatch.setattr(ply_reader, "_READ_BYTES", n_bytes)
+    monkeypatch.setattr(ply_reader, "READ_BYTES", n_bytes)
     assert spoilt(tmp_path).warnings == []
     assert len(spoilt(tmp_path, opacity={row: np.nan}).warnings) == 1
     with pytest.raises(PlyError, match=f"1 splat whose position is not finite, the first in row {row}"):

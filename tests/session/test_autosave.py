@@ -73,8 +73,8 @@ class Desk:
         edit = self.scene.edit
         self.main.run_until(lambda: self.failures or any(s is not None and s.edit is edit for s in self.written))
 
-    def close(self):
-        self.autosave.close()
+    def close(self, *, keep=False):
+        self.autosave.close(keep=keep)
         self.documents.close()
         self.session.close()
 
@@ -92,9 +92,7 @@ def left_behind(folder, x=0.5, *, document=None) -> Path:
     desk.open()
     desk.documents.path = document
     desk.move(x)
-    desk.autosave._slot.lock.release()
-    desk.autosave._slot = None
-    desk.close()
+    desk.close(keep=True)
     return max(folder.glob("*.splap"), key=lambda path: path.stat().st_mtime_ns)
 
 

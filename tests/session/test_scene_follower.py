@@ -40,7 +40,7 @@ def signals_of(scene):
 
 
 def listeners_of(scene):
-    return [listener for signal in signals_of(scene).values() for listener in signal._listeners]
+    return [listener for signal in signals_of(scene).values() for listener in signal.listeners]
 
 
 def test_every_signal_of_a_scene_can_be_followed(new_scene):
@@ -70,7 +70,7 @@ def test_no_connection_to_a_closed_scene_is_left_behind(new_scene):
     screen.show(second)
     assert listeners_of(first) == []
     follower.close()
-    assert listeners_of(second) == [] and screen.scene_changed._listeners == []
+    assert listeners_of(second) == [] and screen.scene_changed.listeners == ()
 
 
 def test_the_scene_on_screen_is_followed_from_the_start_and_none_is_no_scene(new_scene):

@@ -83,13 +83,16 @@ def test_a_drag_shows_poses_and_settles(main, opened):
     scene.pose_changed.connect(lambda: shown.append(scene.kernels))
     handle = opened.steps.add_handle(rows_region(scene, end_rows(scene, 1)))
     main.run_until(lambda: opened.state == "settled")
+    steps = []
+    opened.history.changed.connect(lambda: steps.append(opened.history.undo_label))
     for step in range(1, 6):
         opened.drag.preview({handle.handle_id: Pose((0.05 * step, 0.0, 0.0))})
         before = len(shown)
         main.run_until(lambda before=before: len(shown) > before)
-    assert opened.state == "dragging" and len(opened.history._commands) == 1
+    assert opened.state == "dragging" and steps == []
     opened.drag.commit("Move handle")
     main.run_until(lambda: opened.state == "settled")
+    assert steps == ["Move handle"]
     held = np.mean(scene.kernels.means[handle.region.rows] - scene.splats.means[handle.region.rows], axis=0)
     # Ellipses follow their corners, so the held splats' own centres are off by a small share of their size.
     np.testing.assert_allclose(held, [0.25, 0.0, 0.0], atol=0.02)

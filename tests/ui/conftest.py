@@ -131,8 +131,7 @@ class Driver:
         QTest.keyClick(self.window.viewport, key, modifiers)
 
     def close(self) -> None:
-        self.window._may_close = True
-        self.window.close()
+        self.window.close_for_good()
 
 
 @pytest.fixture
@@ -144,8 +143,7 @@ def empty_window(qapp: QApplication, qtbot, no_leaked_vtk, request) -> Iterator[
     window.show()
     qtbot.waitExposed(window)
     yield window
-    window._may_close = True
-    window.close()
+    window.close_for_good()
     window.deleteLater()
     qapp.sendPostedEvents(None, QEvent.Type.DeferredDelete)
     del window

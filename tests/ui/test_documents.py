@@ -14,6 +14,7 @@ from splap_editor.io.session_file import read_session_file
 from splap_editor.resources import resource
 from splap_editor.session.autosave import Autosave
 from splap_editor.session.documents import Documents
+from splap_editor.session.recovery import recovery_folder
 from splap_editor.session.session import Session
 
 from .conftest import WAIT_MS, Driver
@@ -176,11 +177,10 @@ def leave_behind(driver, qtbot, ply, x):
     qtbot.waitUntil(lambda: run() and session.scene is not None, timeout=WAIT_MS)
     session.halt()
     session.steps.add_handle(Region(session.scene.ellipses.centers[0], 0.1), pose=Pose((x, 0.0, 0.0)))
-    qtbot.waitUntil(lambda: run() and any(autosave._folder.glob("*.splap")), timeout=WAIT_MS)
-    autosave._slot.lock.release()
-    autosave._slot = None
-    for part in (autosave, documents, session):
-        part.close()
+    qtbot.waitUntil(lambda: run() and any(recovery_folder().glob("*.splap")), timeout=WAIT_MS)
+    autosave.close(keep=True)
+    documents.close()
+    session.close()
 
 
 @pytest.mark.parametrize("choice", ["restore", "discard"])
@@ -201,7 +201,5 @@ def test_an_edit_left_behind_is_offered_back(driver, qtbot, ply, choice):
         bar.discard_button.click()
         assert driver.scene is before
     assert bar.text == ""
-    folder = window.autosave._folder
-    window._may_close = True
-    window.close()
-    assert list(folder.iterdir()) == []
+    window.close_for_good()
+    assert list(recovery_folder().iterdir()) == []

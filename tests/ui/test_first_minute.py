@@ -125,8 +125,7 @@ def test_the_sides_of_a_scene_follow_what_is_up(driver, up, side):
     actions, camera = driver.window.actions_, driver.window.view.viewport.camera
     actions[up].trigger()
     actions[f"view.{side}"].trigger()
-    flight = driver.window.view_actions._flight
-    driver.qtbot.waitUntil(lambda: flight.state() == flight.State.Stopped)
+    driver.qtbot.waitUntil(lambda: not driver.window.view_actions.is_flying)
     up_axis = {"view.up_z": (0, 0, 1), "view.up_y": (0, 1, 0), "view.down_y": (0, -1, 0)}[up]
     forward = np.array(camera.view.focal_point) - np.array(camera.view.position)
     along = float(forward @ np.array(up_axis)) / float(np.linalg.norm(forward))
@@ -157,7 +156,7 @@ def test_right_click_offers_a_menu_and_the_wheel_zooms(driver, qtbot):
 
 def test_a_click_on_an_end_of_the_corner_axes_looks_from_there(driver, qtbot):
     viewport = driver.window.view.viewport
-    ends = viewport.triad._ends(viewport.projection)
+    ends = viewport.triad.ends(viewport.projection)
     ratio = driver.window.viewport.devicePixelRatioF()
     driver.click(QPoint(*(int(number) for number in np.rint(ends[2, :2] / ratio))))
     # The flight ends exactly there; the last direction shows it.

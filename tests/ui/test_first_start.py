@@ -111,8 +111,7 @@ def test_a_drag_waits_for_no_loop_that_it_does_not_call(empty_window, qtbot, mon
         assert shares[-1] == 1.0
         # Pictures owe nothing to what is still being compiled.
         assert not TwofoldLoop.uses_compiled
-        empty_window._may_close = True
-        empty_window.close()
+        empty_window.close_for_good()
     finally:
         TwofoldLoop.use_compiled(True)
     assert not is_warm()
@@ -124,9 +123,8 @@ def test_a_window_closed_meanwhile_ends_the_processes(empty_window, qtbot, monke
     try:
         first = open_first(empty_window, resource("samples", "tube.ply"))
         qtbot.waitUntil(lambda: empty_window.session.state == "preparing", timeout=60_000)
-        assert first.compilation.share == 0.0
-        empty_window._may_close = True
-        empty_window.close()
+        assert first.compilation.share == 0.0 and first.compilation.is_running
+        empty_window.close_for_good()
     finally:
         TwofoldLoop.use_compiled(True)
-    assert all(process.returncode is not None for process in first.compilation._processes)
+    assert not first.compilation.is_running

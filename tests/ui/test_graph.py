@@ -12,6 +12,7 @@ from splap_editor.io.recipe import read_recipe
 from splap_editor.io.sample_maker import write_sample
 from splap_editor.session.cards import has_edge
 from splap_editor.session.edit_file import write_edit
+from splap_editor.ui.widgets.number_field import NumberField
 from tests.core.splat_scenes import joined, moved, sheet
 
 WAIT_MS = 60_000
@@ -84,7 +85,7 @@ def test_edges_change_their_colours(driver, color):
     view.set(color=color)
     driver.qtbot.waitUntil(lambda: view.colored.color == color, timeout=WAIT_MS)
     assert not np.array_equal(view.colored.colors, before)
-    np.testing.assert_array_equal(lines(driver)._rgba[:, :3], view.colored.colors)
+    np.testing.assert_array_equal(lines(driver).colors, view.colored.colors)
 
 
 def test_x_cuts_the_inspected_edge_and_undo_puts_it_back(driver, inspected_edge):
@@ -168,7 +169,7 @@ def test_fragments_are_listed_looked_at_and_joined_in_one_step(driver, tmp_path)
 
 def test_another_gap_is_previewed_and_changes_nothing_before_apply(driver):
     panel, scene, surface = driver.window.inspection.graph_panel, driver.scene, driver.scene.surface
-    panel.rule._editors["epsilon"].setValue(0.05)
+    panel.rule.findChild(NumberField, "epsilon").setValue(0.05)
     preview = driver.window.inspection.preview
     driver.qtbot.waitUntil(lambda: preview.graph is not None, timeout=WAIT_MS)
     expected = splat_graph(scene.ellipses, GraphOptions(epsilon=0.0005)).n_edges
@@ -184,8 +185,8 @@ def test_another_gap_is_previewed_and_changes_nothing_before_apply(driver):
 def test_the_newest_preview_wins(driver):
     panel, preview = driver.window.inspection.graph_panel, driver.window.inspection.preview
     for percent in (0.3, 0.2, 0.1):
-        panel.rule._editors["epsilon"].setValue(percent)
+        panel.rule.findChild(NumberField, "epsilon").setValue(percent)
     driver.qtbot.waitUntil(lambda: preview.graph is not None, timeout=WAIT_MS)
     assert preview.wanted.epsilon == pytest.approx(0.001)
     panel.revert.click()
-    assert panel.rule._editors["epsilon"].value() == 0.5 and preview.wanted is None
+    assert panel.rule.findChild(NumberField, "epsilon").value() == 0.5 and preview.wanted is None

@@ -110,11 +110,11 @@ def test_a_pin_is_seen_before_there_is_a_handle(driver):
     view = driver.window.view
     pin = pinned(driver)
     color = [int(PIN_COLOR[i : i + 2], 16) for i in (1, 3, 5)]
-    tints = view.viewport.splats.deformed._tints
+    tints = view.viewport.splats.deformed.tints
     seen = scene_rows(driver, pin)
     assert (tints[seen, :3] == color).all() and np.count_nonzero(tints[:, 3]) == len(seen)
     view.shows_tints = False
-    assert view.viewport.splats.deformed._tints is None
+    assert view.viewport.splats.deformed.tints is None
 
 
 def scene_rows(driver, pin):

@@ -33,7 +33,7 @@ def test_a_click_shows_the_card_and_marks_the_neighbours(driver, picked):
     text = inspection.inspect_panel.splat.text()
     assert f"Row {scene.picked:,}" in text and f"{scene.surface.graph.degrees[node]} graph neighbour" in text
     near = scene.ellipses.rows[inspection.inspected.comparison.first]
-    tints = driver.window.view.viewport.splats.deformed._tints
+    tints = driver.window.view.viewport.splats.deformed.tints
     assert (tints[near, :3] == FIRST_COLOR).all()
     assert np.count_nonzero(tints[:, 3]) == len(near) + 1
 
@@ -48,7 +48,7 @@ def test_two_answers_beside_each_other_are_counted(driver, picked):
     expected = neighbor_set("euclidean", node, scene.ellipses, surface.graph, surface.neighborhoods, k=25)
     np.testing.assert_array_equal(both.second, expected)
     assert f"25 by space, {len(both.only_second)} by it alone" in panel.counts.text()
-    tints = driver.window.view.viewport.splats.deformed._tints
+    tints = driver.window.view.viewport.splats.deformed.tints
     assert (tints[scene.ellipses.rows[both.only_second], :3] == SECOND_COLOR).all()
 
 
@@ -78,7 +78,7 @@ def test_escape_lets_go_of_the_edge_and_then_of_the_splat(driver, picked):
     assert inspected.edge is None and driver.scene.picked is not None
     driver.key(Qt.Key.Key_Escape)
     assert driver.scene.picked is None
-    assert driver.window.view.viewport.splats.deformed._tints is None
+    assert driver.window.view.viewport.splats.deformed.tints is None
 
 
 def test_another_tool_takes_the_marks_away_and_a_drag_orbits(driver, picked):
@@ -88,7 +88,7 @@ def test_another_tool_takes_the_marks_away_and_a_drag_orbits(driver, picked):
     assert not np.allclose(driver.window.view.viewport.camera.view.position, view.position)
     assert driver.scene.picked is not None
     driver.key(Qt.Key.Key_Q)
-    assert driver.window.view.viewport.splats.deformed._tints is None
+    assert driver.window.view.viewport.splats.deformed.tints is None
 
 
 def test_distance_along_the_surface_counts_from_the_picked_splat(driver, picked, qtbot):

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
 from PySide6.QtGui import QDragEnterEvent, QDropEvent
-from PySide6.QtWidgets import QApplication, QMessageBox, QPushButton
+from PySide6.QtWidgets import QApplication, QFileDialog, QMessageBox, QPushButton
 
 from splap_editor.core.handle_nodes import Region
 from splap_editor.engine.edit import Pose
@@ -148,7 +148,8 @@ def test_saved_edits_open_again(driver, qtbot, tmp_path):
     bend(driver)
     edit = driver.scene.edit
     path = tmp_path / "edit.json"
-    driver.window.files._write_edit(path)
+    driver.window.actions_["file.export_edit"].trigger()
+    driver.window.findChild(QFileDialog).fileSelected.emit(str(path))
     driver.window.actions_["handle.reset_all"].trigger()
     driver.window.files.open_path(path)
     qtbot.waitUntil(lambda: driver.window.toast.text == "Opened the edit edit.json.", timeout=WAIT_MS)

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QComboBox
 
 from splap_editor.resources import resource
 from splap_editor.ui.dialogs.preferences_dialog import PreferencesDialog
-from splap_editor.ui.preferences import GB, MB, Preferences, _read
+from splap_editor.ui.preferences import GB, MB, Preferences, kept_preferences
 from splap_editor.ui.widgets.number_field import NumberField
 
 
@@ -25,9 +25,9 @@ def test_numbers_reach_what_they_are_about_and_are_kept(driver):
     assert session.history.max_bytes == 32 * MB
     assert session.n_threads == 2
     assert session.cache.max_bytes == round(0.5 * GB)
-    assert _read() == Preferences(undo_mb=32, n_threads=2, cache_gb=0.5)
+    assert kept_preferences() == Preferences(undo_mb=32, n_threads=2, cache_gb=0.5)
     driver.window.program.store.reset()
-    assert session.history.max_bytes == 256 * MB and _read() == Preferences()
+    assert session.history.max_bytes == 256 * MB and kept_preferences() == Preferences()
     page.close()
 
 
@@ -43,7 +43,7 @@ def test_the_cache_can_be_cleared(driver):
 @pytest.mark.parametrize(("name", "value"), [("undo_mb", "much"), ("navigation", "teleport"), ("n_threads", 0)])
 def test_kept_nonsense_is_passed_over(own_settings, name, value):
     QSettings().setValue(f"preferences/{name}", value)
-    assert _read() == Preferences()
+    assert kept_preferences() == Preferences()
 
 
 def test_up_of_new_scenes_can_be_chosen(driver):

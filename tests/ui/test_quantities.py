@@ -22,7 +22,7 @@ def size_shown(driver, qtbot) -> None:
 
 
 def painted(driver) -> np.ndarray:
-    return driver.window.view.viewport.splats.deformed._tints
+    return driver.window.view.viewport.splats.deformed.tints
 
 
 def test_choosing_a_quantity_paints_the_splats_and_own_colours_bring_them_back(driver, size_shown):

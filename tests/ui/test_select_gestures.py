@@ -163,4 +163,4 @@ def test_escape_during_a_lasso_keeps_the_selection(driver):
     driver.key(Qt.Key.Key_Escape)
     driver.release(outline[12])
     assert not driver.scene.selection.any()
-    assert driver.window.overlay._hud.outline == ()
+    assert driver.window.tools.context.hud.outline == ()

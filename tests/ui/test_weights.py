@@ -14,6 +14,7 @@ from splap_editor.io.ply import read_ply
 from splap_editor.resources import resource
 from splap_editor.session.edit_file import write_edit
 from splap_editor.session.placement import disc_rows, rows_region
+from splap_editor.ui.widgets.choices import Choice
 from splap_editor.ui.widgets.number_field import ScrubLabel
 from splap_editor.viewport.weight_colors import BAND_COLORS, REST_COLOR, weight_tints
 
@@ -39,7 +40,7 @@ def placed(driver, shares=(0.1, 0.9), method=1):
 
 def laid(driver):
     """Colours over the splats in the picture."""
-    return driver.window.view.viewport.splats.deformed._tints
+    return driver.window.view.viewport.splats.deformed.tints
 
 
 def is_weights(driver):
@@ -128,7 +129,7 @@ def test_a_typed_radius_is_outlined_while_it_is_typed(driver):
 def test_blending_is_an_undoable_option_of_the_weights(driver):
     placed(driver)
     form = driver.window.deformer_panel.forms[BbwOptions]
-    box = form._editors["blending"]
+    box = form.findChild(Choice, "blending")
     assert not box.isHidden()
     box.setCurrentIndex(box.findData("linear"))
     assert driver.scene.edit.options[BbwOptions].blending == "linear"

@@ -24,15 +24,21 @@ VIEW = View(np.array([3.0, -4.0, 2.0]), np.array([0.2, 0.1, -0.3]), UP)
 
 
 @pytest.fixture
-def camera():
-    window, renderer = vtkRenderWindow(), vtkRenderer()
+def window():
+    window = vtkRenderWindow()
     window.SetOffScreenRendering(True)
     window.SetSize(300, 200)
+    yield window
+    window.Finalize()
+
+
+@pytest.fixture
+def camera(window):
+    renderer = vtkRenderer()
     window.AddRenderer(renderer)
     camera = Camera(renderer)
     camera.view = VIEW
-    yield camera
-    window.Finalize()
+    return camera
 
 
 def frame_of(view):
@@ -122,13 +128,13 @@ def test_zoom_and_pan_undo_themselves():
 
 @pytest.mark.parametrize("is_parallel", [False, True])
 @pytest.mark.parametrize("size", [(300, 200), (100, 400)])
-def test_framed_points_fill_the_picture_and_lie_inside(camera, is_parallel, size):
+def test_framed_points_fill_the_picture_and_lie_inside(window, camera, is_parallel, size):
     camera.vtk  # noqa: B018 - the renderer makes its camera
-    camera._renderer.GetRenderWindow().SetSize(*size)
+    window.SetSize(*size)
     camera.set_parallel(is_parallel)
     points = box_corners(np.array([[1.0, 2.0, 3.0], [4.0, 3.0, 9.0]]))
     camera.view = camera.frame(points)
-    share = np.abs(camera.projection().pixels(points) / camera._renderer.GetSize() * 2.0 - 1.0)
+    share = np.abs(camera.projection().pixels(points) / size * 2.0 - 1.0)
     assert 0.75 < share.max() < 1.0
 
 

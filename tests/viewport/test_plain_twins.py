@@ -30,7 +30,7 @@ def test_a_ray_meets_the_same_splats(seed):
     direction = tuple(np.float32(target / np.linalg.norm(target)))
     arguments = (*scene(rng), np.float32(1.5), 20, tuple(np.zeros(3, np.float32)), direction)
     found = []
-    for loop in (picking._hits.compiled, picking._hits.plain):
+    for loop in (picking.ray_hits.compiled, picking.ray_hits.plain):
         rows, hits = np.full(N, -1), np.zeros((N, 2), np.float32)
         count = loop(*arguments, rows, hits)
         found.append((rows[:count], hits[:count]))
@@ -39,7 +39,7 @@ def test_a_ray_meets_the_same_splats(seed):
     # Single precision, summed in another order; a ray that grazes a splat cancels most digits.
     np.testing.assert_allclose(found[0][1], found[1][1], rtol=1e-3, atol=1e-4)
     rows, hits = np.empty(2, np.int64), np.empty((2, 2), np.float32)
-    assert picking._hits.plain(*arguments, rows, hits) == len(found[0][0]), "how many there are, whatever has room"
+    assert picking.ray_hits.plain(*arguments, rows, hits) == len(found[0][0]), "how many there are, whatever has room"
     np.testing.assert_array_equal(rows, found[0][0][:2])
 
 
@@ -47,8 +47,8 @@ def test_tints_mix_to_the_same_bytes():
     colors, tints = np.random.default_rng(2).integers(0, 256, (2, 4 * N, 4)).astype(np.uint8)
     colors[:9], tints[:9, 3] = 255, 0
     mixed = np.zeros((2, 4 * N, 4), np.uint8)
-    splat_actor._mix.compiled(colors, tints, mixed[0])
-    splat_actor._mix.plain(colors, tints, mixed[1])
+    splat_actor.mix_colors.compiled(colors, tints, mixed[0])
+    splat_actor.mix_colors.plain(colors, tints, mixed[1])
     np.testing.assert_array_equal(*mixed)
 
 
@@ -60,7 +60,7 @@ def test_centres_fall_on_the_same_pixels(is_perspective):
     if is_perspective:
         clip[3] = [0, 0, 1, 0]
     screens = np.zeros((2, N, 3), np.float32)
-    for loop, screen in zip((regions._project.compiled, regions._project.plain), screens, strict=True):
+    for loop, screen in zip((regions.project.compiled, regions.project.plain), screens, strict=True):
         loop(means, colors, flags, 50, clip, np.float32(90), np.float32(60), screen)
     assert 9 < np.isnan(screens[0, :, 0]).sum() < N
     np.testing.assert_allclose(*screens, rtol=1e-4)
@@ -73,8 +73,8 @@ def test_a_stroke_takes_the_same_points(n_points):
     screen[::10] = np.nan
     path = np.cumsum(rng.uniform(-8, 8, (n_points, 2)), axis=0) + 50
     inside = np.ones((2, N), bool)
-    regions._near_path.compiled(screen, path, 15.0, inside[0])
-    regions._near_path.plain(screen, path, 15.0, inside[1])
+    regions.near_path.compiled(screen, path, 15.0, inside[0])
+    regions.near_path.plain(screen, path, 15.0, inside[1])
     assert inside[0].any() and not inside[0].all()
     np.testing.assert_array_equal(*inside)
 
@@ -88,10 +88,10 @@ def test_the_depth_grid_is_the_same(is_perspective):
         clip[3] = [0, 0, 1, 0]
     screen = np.empty((N, 3), np.float32)
     size = np.array([90, 60], np.float32)
-    regions._project(means, colors, flags, 10, clip, *size, screen)
+    regions.project(means, colors, flags, 10, clip, *size, screen)
     arguments = (screen, axes_u, axes_v, shape, colors, clip, size, np.float32(1.0), np.float32(1.2), 30)
     grids = np.full((2, 15, 20), np.inf, np.float32)
-    for loop, grid in zip((regions._depth_grid.compiled, regions._depth_grid.plain), grids, strict=True):
+    for loop, grid in zip((regions.depth_grid.compiled, regions.depth_grid.plain), grids, strict=True):
         loop(*arguments, np.float32(10.0), np.float32(8.0), grid)
     covered = np.isfinite(grids[0])
     assert covered.sum() > 50
@@ -108,7 +108,7 @@ def test_a_view_has_the_same_colours(degree):
     positions = rng.standard_normal((N, 3))
     positions[0] = camera = rng.standard_normal(3)
     colors = np.empty((2, N, 3), np.float32)
-    loop = spherical_harmonics._view_colors
+    loop = spherical_harmonics.write_view_colors
     for each, into in zip((loop.compiled, loop.plain), colors, strict=True):
         each(sh0, shN, positions, rotations, camera, degree, into)
     # The compiled loop sums in single precision.
@@ -121,7 +121,7 @@ def test_the_order_is_the_same(spoil):
     means[::7] = means[0]
     direction = np.array([0.1, 0.2, -0.9], np.float32)
     orders = np.full((2, len(means)), -1, np.int32)
-    loop = depth_order._counting_sort
+    loop = depth_order.counting_sort
     for each, order in zip((loop.compiled, loop.plain), orders, strict=True):
         each(means, direction, order)
     depths = [means[order] @ direction for order in orders]
@@ -136,11 +136,11 @@ def test_the_order_is_the_same(spoil):
 
 def test_a_loop_and_its_twin_take_the_same_arguments():
     loops = [
-        depth_order._counting_sort,
-        picking._hits,
-        regions._near_path,
-        regions._depth_grid,
-        spherical_harmonics._view_colors,
+        depth_order.counting_sort,
+        picking.ray_hits,
+        regions.near_path,
+        regions.depth_grid,
+        spherical_harmonics.write_view_colors,
     ]
     for loop in loops:
         assert inspect.signature(loop.compiled.py_func) == inspect.signature(loop.plain)

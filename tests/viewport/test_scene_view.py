@@ -78,14 +78,14 @@ def test_a_turned_view_is_sorted_by_the_worker(compare):
         splats.compare = compare
         turn(view.viewport, 0.0)
         settle(main, session)
-        before = [actor._order for actor in splats.shown_actors()]
+        before = [actor.order for actor in splats.shown_actors()]
         turn(view.viewport, 2.0)
-        after = [actor._order for actor in splats.shown_actors()]
+        after = [actor.order for actor in splats.shown_actors()]
         assert all(a is b for a, b in zip(after, before, strict=True)), "not by the frame that is drawn"
         settle(main, session)
         direction = view.viewport.projection.direction.astype(np.float32)
         for actor in splats.shown_actors():
-            np.testing.assert_array_equal(actor._order, depth_order(actor.means, direction))
+            np.testing.assert_array_equal(actor.order, depth_order(actor.means, direction))
 
 
 def test_a_closed_scene_and_a_closed_view_are_let_go_of():
@@ -100,4 +100,4 @@ def test_a_closed_scene_and_a_closed_view_are_let_go_of():
 
 
 def listeners_of(scene):
-    return [each for signal in vars(scene).values() if isinstance(signal, Signal) for each in signal._listeners]
+    return [each for signal in vars(scene).values() if isinstance(signal, Signal) for each in signal.listeners]

@@ -165,7 +165,7 @@ def test_corner_axes_are_clicked_where_they_are_drawn():
     with canvas(size=(400, 300)) as viewport:
         viewport.triad.is_shown = True
         picture = drawn(viewport)
-        ends = viewport.triad._ends(viewport.projection)
+        ends = viewport.triad.ends(viewport.projection)
         for i, axis in enumerate((*np.eye(3), *-np.eye(3))):
             np.testing.assert_array_equal(viewport.hover_axes(tuple(ends[i, :2])), axis)
             x, y = ends[i, :2].astype(int)

@@ -31,7 +31,7 @@ _DRAG_TOLERANCE = 5e-4
 """A drag frame stops after so many iterations, or when one moves no node by more than this (units of s). What is left
 is made up in the frames that follow."""
 
-_REPORT_SECONDS = 0.1
+REPORT_SECONDS = 0.1
 
 
 class ArapDeformer:
@@ -136,7 +136,8 @@ class ArapDeformer:
         return Constraints(labels, clamped, self._components())
 
     @cached_property
-    def _problem(self) -> ArapProblem:
+    def problem(self) -> ArapProblem:
+        """The minimisation over all nodes that have to be known."""
         return ArapProblem(self.rest, self.scene.W, self._constraints, self._beta)
 
     @cached_property
@@ -188,7 +189,7 @@ class ArapDeformer:
     def _approached(self, transforms: NDArray[np.float64], progress: Progress) -> ArapMinimiser:
         """The drag's minimiser, brought from rest to ``transforms``; the coarse one where there is one."""
         report = SolveReport(progress)
-        problem = self._problem if self._coarse is None else self._coarse.problem
+        problem = self.problem if self._coarse is None else self._coarse.problem
         minimiser = approached(problem, self.handles, transforms, self.scene_scale, report)
         if self._coarse is not None:
             minimiser.settle(_COARSE_TOLERANCE * self.scene_scale, MAX_ITERATIONS, report)
@@ -197,7 +198,7 @@ class ArapDeformer:
     def _spread(self, dragged: ArapMinimiser, transforms: NDArray[np.float64], whole: Pose) -> None:
         """Bring a drag's minimiser's pose to all free nodes."""
         if self._coarse is None:
-            self._problem.spread(dragged.pose, whole)
+            self.problem.spread(dragged.pose, whole)
         else:
             self._coarse.spread(dragged.pose, transforms, self.rest, whole)
 
@@ -257,7 +258,7 @@ class SolveReport:
     def tell(self, share: float) -> bool:
         """Report a share; False if the last report was too recent."""
         self._share = share
-        if time.monotonic() - self._last < _REPORT_SECONDS:
+        if time.monotonic() - self._last < REPORT_SECONDS:
             return False
         self._progress(share)
         self._last = time.monotonic()

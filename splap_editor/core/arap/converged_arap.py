@@ -52,7 +52,7 @@ class ConvergedArap(ArapDeformer):
         dragged = self._approached(transforms, part_of(progress, 0.0, 0.3))
         start = self._held_pose(transforms)
         self._spread(dragged, transforms, start)
-        problem = self._problem
+        problem = self.problem
         minimiser = ArapMinimiser(problem, Pose(start.positions[problem.nodes], start.rotations[problem.nodes]))
 
         def settled(residual: float) -> Deformation:

@@ -19,7 +19,7 @@ class LocalGlobalArap(ArapDeformer):
         """Iterate from rest with the held nodes moved; ``residual`` is unknown, inf, and nothing is shown meanwhile."""
         transforms = self._checked(transforms)
         pose = self._held_pose(transforms)
-        problem = self._problem
+        problem = self.problem
         rows = Pose.of_rest(problem.rest)
         problem.hold(rows, transforms)
         report = SolveReport(progress)
@@ -51,7 +51,7 @@ class LibiglArap(ArapDeformer):
         placed = self._constraints.free
         moved = libigl_arap(self.rest, self._triangles, self._constraints, pose.positions, self.options.iterations)
         pose.positions[placed] = moved[placed]
-        problem = self._problem
+        problem = self.problem
         rows = Pose(pose.positions[problem.nodes], pose.rotations[problem.nodes])
         problem.fit_rotations(rows)
         problem.spread(rows, pose)

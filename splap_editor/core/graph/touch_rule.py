@@ -18,7 +18,7 @@ REDUNDANCY = 0.4
 """A contact is passed over if its partner and a better one are that much nearer to each other: where splats lie in
 many layers, a stack of them takes one place in the ranking and not all."""
 
-_SHORT_LIST = 12
+SHORT_LIST = 12
 """So many contacts are ranked before redundant ones are passed over."""
 
 N_NEAR = 8
@@ -76,7 +76,7 @@ def touch_edges(tree: EllipseTree, epsilon: float, progress: Progress) -> tuple[
     n = len(tree.nodes)
     everything = np.arange(n)
     partners, scales = _nearest(
-        tree, everything, everything, epsilon, 1.0, PEER_RATIO, _SHORT_LIST, part_of(progress, 0.0, 0.8)
+        tree, everything, everything, epsilon, 1.0, PEER_RATIO, SHORT_LIST, part_of(progress, 0.0, 0.8)
     )
     near = _mutual(tree, partners[:, :N_NEAR], scales[:, :N_NEAR])
     kept, kept_scales = np.empty((n, N_PARTNERS), np.int32), np.empty((n, N_PARTNERS))

@@ -157,7 +157,7 @@ def view_colors(
         If K is not that of a degree from 0 to 4.
     """
     colors = np.empty((len(positions), 3), np.float32)
-    _view_colors(
+    write_view_colors(
         np.ascontiguousarray(sh0, np.float32),
         np.ascontiguousarray(shN, np.float32),
         np.ascontiguousarray(positions, np.float64),
@@ -310,4 +310,4 @@ def _view_colors_plain(sh0, shN, positions, rotations, camera, degree, colors):
     np.maximum(seen, 0.0, out=colors, casting="same_kind")
 
 
-_view_colors = TwofoldLoop(_view_colors_compiled, _view_colors_plain)
+write_view_colors = TwofoldLoop(_view_colors_compiled, _view_colors_plain)

@@ -11,7 +11,7 @@ from splap_editor.core.surface.geodesics import Neighborhoods, node_runs
 
 _CHUNK = 16384
 
-_HORIZON = 16.0
+HORIZON = 16.0
 """Half-side of the square a Voronoi cell is clipped from, in units of the farthest neighbour's distance. A triangle
 whose circumcentre lies beyond is a sliver along the border of the surface."""
 
@@ -100,7 +100,7 @@ def _stars(first, centers, normals, indptr, indices, corners, counts):
         i = first + row
         begin, end = indptr[i], indptr[i + 1]
         m, farthest = _tangent_layout(i, centers, normals, indices[begin:end], x, y, node)
-        edge = _HORIZON * farthest
+        edge = HORIZON * farthest
         px[0], py[0], px[1], py[1] = -edge, -edge, edge, -edge
         px[2], py[2], px[3], py[3] = edge, edge, -edge, edge
         n = 4

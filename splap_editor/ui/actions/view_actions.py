@@ -37,9 +37,14 @@ class ViewActions(QObject):
         self._frame_again: View | None = None
         session.state_changed.connect(self._on_state_changed)
 
+    @property
+    def is_flying(self) -> bool:
+        """Whether the camera is on its way."""
+        return self._flight.state() == QVariantAnimation.State.Running
+
     def fly_to(self, end: View) -> None:
         """Move the camera there, quickly enough not to wait for."""
-        if self._flight.state() == QVariantAnimation.State.Running:
+        if self.is_flying:
             self._flight.stop()
             self._viewport.end_motion()
         self._ends = (self._viewport.camera.view, end)
@@ -81,8 +86,7 @@ class ViewActions(QObject):
         if self._frame_again is None or self._session.state not in ("ready", "settled"):
             return
         asked, self._frame_again = self._frame_again, None
-        is_flying = self._flight.state() == QVariantAnimation.State.Running
-        flown_to = self._ends[1] if self._ends is not None and is_flying else None
+        flown_to = self._ends[1] if self._ends is not None and self.is_flying else None
         # Who has moved the camera since is not carried off.
         if flown_to is asked or self._viewport.camera.view.is_near(asked):
             self.fly_to(self._viewport.frame())

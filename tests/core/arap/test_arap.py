@@ -340,7 +340,7 @@ def test_coarse_drag_moves_with_a_handle_between_the_samples():
 
 
 def test_intermediate_results_are_shown_while_settling(monkeypatch):
-    monkeypatch.setattr("splap_editor.core.arap.arap._REPORT_SECONDS", 0.0)
+    monkeypatch.setattr("splap_editor.core.arap.arap.REPORT_SECONDS", 0.0)
     handles = holding(STRIP.rest, [TIP], ROOT)
     shown, shares = [], []
     result = STRIP.deformer(handles).solve(BEND, progress=shares.append, shown=shown.append)
@@ -352,7 +352,7 @@ def test_intermediate_results_are_shown_while_settling(monkeypatch):
 
 
 def test_cancelled_solve_leaves_the_deformer_usable(monkeypatch):
-    monkeypatch.setattr("splap_editor.core.arap.arap._REPORT_SECONDS", 0.0)
+    monkeypatch.setattr("splap_editor.core.arap.arap.REPORT_SECONDS", 0.0)
     deformer = STRIP.deformer(holding(STRIP.rest, [TIP], ROOT))
     expected = STRIP.deformer(holding(STRIP.rest, [TIP], ROOT)).solve(BEND)
 

@@ -44,7 +44,7 @@ def test_the_touch_rule_is_its_twin(scene):
     twin = touch_rule(
         touch,
         ellipses.reaches,
-        short_list=module._SHORT_LIST,
+        short_list=module.SHORT_LIST,
         n_partners=module.N_PARTNERS,
         redundancy=module.REDUNDANCY,
         n_near=module.N_NEAR,

@@ -25,7 +25,7 @@ def test_stars_are_the_delaunay_twins(scene):
     assert triangles.dtype == np.int32
     for node in range(ellipses.n_nodes):
         found = triangles[triangles[:, 0] == node].tolist()
-        assert {frozenset(triangle) for triangle in found} == star(ellipses, neighborhoods, node, module._HORIZON)
+        assert {frozenset(triangle) for triangle in found} == star(ellipses, neighborhoods, node, module.HORIZON)
         assert len({frozenset(triangle) for triangle in found}) == len(found)
 
 
