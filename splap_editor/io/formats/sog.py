@@ -29,7 +29,7 @@ _WIDTHS = {3: 192, 8: 512, 15: 960}
 """Pixels across a palette, 64 entries side by side, by the coefficients of an entry."""
 _PARTS, _MARKS = (b'"means"', b'"scales"', b'"quats"', b'"sh0"', b'"shN"'), (b'.webp"', b'"codebook"', b'"mins"')
 _LARGEST_META = 1 << 22
-_LARGEST_PICTURE = 1 << 30
+LARGEST_PICTURE = 1 << 30
 _IDENTITY_BELOW = 252
 """Fourth channels of rotations below this name no largest part."""
 
@@ -139,7 +139,7 @@ class _Archive(ABC):
         """(height, width, 4) pixels; no larger ones are unpacked than the splats call for."""
         from PIL import Image
 
-        data = self.member(name, _LARGEST_PICTURE)
+        data = self.member(name, LARGEST_PICTURE)
         width, height = self._size(data, name)
         if not at_least <= width * height <= 4 * at_least + (1 << 20):
             raise self.source.damaged(f"{name[:80]!r} has {width:,} × {height:,} pixels for {at_least:,} splats")

@@ -128,7 +128,7 @@ def test_a_sog_in_a_folder_follows_no_link_out_of_it(tmp_path, scene):
 def test_a_sog_in_a_folder_that_is_too_large_or_no_file_is_not_read(tmp_path, scene, monkeypatch):
     folder = unbundled(tmp_path, scene)
     with monkeypatch.context() as limits:
-        limits.setattr(sog, "_LARGEST_PICTURE", 100)
+        limits.setattr(sog, "LARGEST_PICTURE", 100)
         with pytest.raises(FormatError, match="at most 100 are read"):
             read_splats(folder)
     with (folder / "scales.webp").open("r+b") as file:
