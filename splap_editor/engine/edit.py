@@ -6,12 +6,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.deformers import DeformerRow, deformer_row
+from splap_editor.core.base_edit import BaseEdit
 from splap_editor.core.graph.options import GraphOptions
 from splap_editor.core.handle_nodes import Region
 from splap_editor.core.index_spaces import FileMask
-from splap_editor.core.options import Length, OptionSet
-from splap_editor.core.place import Place
+from splap_editor.core.options import Length
 from splap_editor.core.pose import Pose
 from splap_editor.core.reach_options import CageOptions
 from splap_editor.core.timeline import Timeline
@@ -89,42 +88,24 @@ class Pin:
 
 
 @dataclass(frozen=True, eq=False)
-class Edit:
-    """Everything that decides the pose, as one immutable value; undo swaps references to it.
+class Edit(BaseEdit[Handle, Pin]):
+    """Everything that decides the pose, as one immutable value; undo swaps references to it. `BaseEdit` with these.
 
     Parameters
     ----------
-    handles : tuple of Handle
-    pins : tuple of Pin
-    method : str
-        One of those in `DEFORMERS`.
-    options : OptionSet
-        `GraphOptions`, `ReachOptions`, `AdaptationOptions`, and those of every deformer.
     timeline : Timeline
         Poses at other frames than the one shown.
     removal : Removal
         Splats that are left out of everything; handles, pins and mends go on counting in the file's rows.
-    place : Place
-        How what comes of all that is moved, turned and scaled as one body on its way into a file.
     """
 
-    handles: tuple[Handle, ...] = ()
-    pins: tuple[Pin, ...] = ()
-    method: str = "arap"
-    options: OptionSet = OptionSet()
     timeline: Timeline = field(default_factory=Timeline)
     removal: Removal = field(default_factory=Removal)
-    place: Place = field(default_factory=Place)
 
     @property
     def graph(self) -> GraphOptions:
         """What the scene's surface is made by."""
         return self.options[GraphOptions]
-
-    @property
-    def deformer(self) -> DeformerRow:
-        """What is known of the deformer that is named."""
-        return deformer_row(self.method, self.options)
 
     def with_options(self, *groups: object) -> "Edit":
         """Replace some option groups."""

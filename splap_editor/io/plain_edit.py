@@ -1,11 +1,11 @@
 """An edit as plain values: what a script writes and a recipe holds, by place or file row, of no file in particular."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
+from splap_editor.core.base_edit import BaseEdit
 from splap_editor.core.camera_path import CameraKey
 from splap_editor.core.index_spaces import FileRow
-from splap_editor.core.options import Length, OptionSet
-from splap_editor.core.place import Place
+from splap_editor.core.options import Length
 from splap_editor.core.pose import Pose
 from splap_editor.core.reach_options import CageOptions
 from splap_editor.core.removal import RemovalStep
@@ -80,41 +80,25 @@ class Handle:
 
 
 @dataclass(frozen=True)
-class Edit:
-    """An edit: which splats are moved where, what stays, and how the rest follows.
+class Edit(BaseEdit[Handle, Pin]):
+    """An edit by place or file row; `BaseEdit` with the following.
 
     Parameters
     ----------
-    handles : tuple of Handle
-    pins : tuple of Pin
-    method : str
-        One of those in `DEFORMERS`.
-    options : OptionSet
-        `GraphOptions`, `ReachOptions`, `AdaptationOptions`, and those of every deformer; any iterable of such groups
-        will do.
     rows_of : str
         Content hash of the only file that rows may be meant of, ``"blake2b:…"``; empty where any file of that many
         rows will do. Formats that put rows in an order of their own need it.
     remove : tuple of RemovalStep
         Splats that are left out of everything.
-    place : Place
-        How all of it is moved, turned and scaled in the end.
     camera : tuple of CameraKey
         Where the camera stands at frames of a video, ascending; in the file's coordinates.
     """
 
-    handles: tuple[Handle, ...] = ()
-    pins: tuple[Pin, ...] = ()
-    method: str = "arap"
-    options: OptionSet = OptionSet()
     rows_of: str = ""
     remove: tuple[RemovalStep, ...] = ()
-    place: Place = field(default_factory=Place)
     camera: tuple[CameraKey, ...] = ()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "handles", tuple(self.handles))
-        object.__setattr__(self, "pins", tuple(self.pins))
+        super().__post_init__()
         object.__setattr__(self, "remove", tuple(self.remove))
         object.__setattr__(self, "camera", tuple(self.camera))
-        object.__setattr__(self, "options", OptionSet(*self.options))

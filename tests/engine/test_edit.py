@@ -1,10 +1,12 @@
 """Laws of poses and edits."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
+import pytest
 
 from splap_editor.core.arap.options import ArapOptions
+from splap_editor.core.base_edit import BaseEdit
 from splap_editor.core.bbw.options import BbwOptions
 from splap_editor.core.handle_nodes import Region
 from splap_editor.core.pose import Pose
@@ -12,6 +14,7 @@ from splap_editor.core.reach_options import ReachOptions
 from splap_editor.core.splats.rotations import quats_to_matrices
 from splap_editor.engine.edit import Edit, Handle, Pin, binds_like, poses_like
 from splap_editor.engine.recipe_edit import edit_of, recipe_of
+from splap_editor.io import plain_edit as plain
 from tests.core.splat_scenes import sheet
 
 
@@ -31,6 +34,21 @@ def handle(handle_id=1, center=(1.0, 2.0, 3.0), pose=None):
 def test_the_rest_pose_moves_nothing():
     np.testing.assert_array_equal(Pose().matrix(np.array([1.0, 2.0, 3.0])), np.eye(4))
     assert Pose().is_identity
+
+
+@pytest.mark.parametrize("kind", [Edit, plain.Edit])
+def test_an_unknown_method_is_refused_with_those_known_however_an_edit_is_made(kind):
+    with pytest.raises(ValueError, match="method must be one of arap, bbw, got 'lbs'"):
+        kind(method="lbs")
+    with pytest.raises(ValueError, match="method must be one of arap, bbw, got 'lbs'"):
+        replace(kind(), method="lbs")
+
+
+def test_no_field_of_an_edit_is_declared_twice():
+    own = [set(kind.__annotations__) for kind in (BaseEdit, Edit, plain.Edit)]
+    assert not (own[0] & own[1] or own[0] & own[2] or own[1] & own[2])
+    assert {each.name for each in fields(Edit)} == own[0] | own[1]
+    assert {each.name for each in fields(plain.Edit)} == own[0] | own[2]
 
 
 def test_moving_a_pose_composes_world_transforms():
