@@ -17,20 +17,20 @@ Group = TypeVar("Group")
 Look = Callable[[], None]
 """Called now and then while a long document is read; raises `splap_editor.core.progress.Cancelled` to stop that."""
 
-_ITEMS = 1 << 12
+ITEMS = 1 << 12
 """Numbers, or items of a list, from one look to the next."""
 
 _MOST_DIGITS = 400
 """Digits of a whole number: more than the largest float has."""
 
-_MOST_VALUES = 4_000_000
+MOST_VALUES = 4_000_000
 """Lists, texts, flags and nulls in a document, an object counting for four: each takes up to 60 bytes of memory."""
 
 
 _MARKS = {b"[": 1, b'"': 0.5, b"{": 4, b"null": 1, b"true": 1, b"false": 1}
 """What gives values away that are counted, and for how many of them each stands."""
 
-_MOST_KEYS = 1 << 12
+MOST_KEYS = 1 << 12
 """Keys and other colons for each object."""
 
 
@@ -222,7 +222,7 @@ class JsonObject:
     def _looked_at(self, items: Sequence[Any]) -> Iterator[tuple[int, Any]]:
         """Items with their numbers; it may be stopped between them."""
         for i, item in enumerate(items):
-            if i % _ITEMS == 0:
+            if i % ITEMS == 0:
                 self._look()
             yield i, item
 
@@ -270,7 +270,7 @@ def parsed_json(data: bytes, error: Error, look: Look = no_look) -> Any:
     def seen_one() -> None:
         nonlocal n_seen
         n_seen += 1
-        if n_seen % _ITEMS == 0:
+        if n_seen % ITEMS == 0:
             look()
 
     def distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -299,10 +299,10 @@ def parsed_json(data: bytes, error: Error, look: Look = no_look) -> Any:
         look()
         n_values += int(data.count(mark) * n_each)
     # A long object is parsed in one go, and no document here has one.
-    if data.count(b":") > _MOST_KEYS * (1 + data.count(b"{")):
-        raise error(f"it holds objects of more than {_MOST_KEYS:,} keys")
-    if n_values > _MOST_VALUES:
-        raise error(f"it holds more than {_MOST_VALUES:,} lists, objects, texts, flags and nulls")
+    if data.count(b":") > MOST_KEYS * (1 + data.count(b"{")):
+        raise error(f"it holds objects of more than {MOST_KEYS:,} keys")
+    if n_values > MOST_VALUES:
+        raise error(f"it holds more than {MOST_VALUES:,} lists, objects, texts, flags and nulls")
     try:
         return json.loads(data.decode("utf-8-sig"), object_pairs_hook=distinct, parse_int=whole, parse_float=real)
     except json.JSONDecodeError as problem:

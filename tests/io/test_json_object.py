@@ -36,7 +36,7 @@ LONG = {
 
 @pytest.mark.parametrize("name", LONG)
 def test_a_long_document_can_be_stopped_while_it_is_parsed_and_while_it_is_understood(name, tmp_path, monkeypatch):
-    monkeypatch.setattr(json_object, "_ITEMS", 64)
+    monkeypatch.setattr(json_object, "ITEMS", 64)
     path = tmp_path / name
     path.write_text(json.dumps(LONG[name]))
     read = read_session_file if path.suffix == ".splap" else read_recipe
@@ -64,8 +64,8 @@ def test_a_long_document_can_be_stopped_while_it_is_parsed_and_while_it_is_under
     ],
 )
 def test_what_is_parsed_in_one_go_is_bounded_before_it_is(text, message, monkeypatch):
-    monkeypatch.setattr(json_object, "_MOST_VALUES", 20)
-    monkeypatch.setattr(json_object, "_MOST_KEYS", 16)
+    monkeypatch.setattr(json_object, "MOST_VALUES", 20)
+    monkeypatch.setattr(json_object, "MOST_KEYS", 16)
     with pytest.raises(ValueError, match=message):
         parsed_json(text.encode(), ValueError)
 
