@@ -47,6 +47,16 @@ class FloaterPreview:
         """Whether somebody wants to see them."""
         return self._strength is not None
 
+    @property
+    def is_looking(self) -> bool:
+        """Whether a search is under way, wanted or not."""
+        return self._searches.is_busy
+
+    @property
+    def search(self) -> FloaterSearch | None:
+        """What was found of the scene as it is; None: it has not been looked through."""
+        return self._search
+
     def show(self, strength: float) -> None:
         """Find what floats at a strength in what is left of the scene."""
         self._strength = strength

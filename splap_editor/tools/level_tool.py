@@ -32,6 +32,11 @@ class LevelTool(Tool):
         SceneFollower(context.session, self._forget, edit_changed=self._forget)
 
     @property
+    def is_looking(self) -> bool:
+        """Whether a floor is being looked for, wanted or not."""
+        return self._job.is_busy
+
+    @property
     def claim(self) -> Claim:
         """No gizmo: a handle that is moved would drop the preview."""
         return Claim(None)

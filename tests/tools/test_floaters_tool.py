@@ -69,10 +69,10 @@ def test_strength_changes_the_preview_and_brackets_frame_each_group(hand):
     assert hand.key("]") and tool.looked_at == 0
     assert hand.key("[") and tool.looked_at == n - 1
     assert len(views) == 2
-    search = tool.preview._search
+    search = tool.preview.search
     hand.context.held(FloaterOptions).set(FloaterOptions(0.0))
     hand.main.run_until(lambda: not len(tool.found.rows))
-    assert tool.preview._search is search
+    assert tool.preview.search is search
     assert "Nothing floats" in hand.context.hud.text and not hand.key("]")
 
 
@@ -124,12 +124,12 @@ def test_a_large_scene_is_looked_through_ahead_and_the_search_outlives_the_tool(
     monkeypatch.setattr("splap_editor.session.floater_preview.AHEAD_SPLATS", 10)
     tool = hand.tools.tools["floaters"]
     hand.session.open(resource("samples", "tube.ply"))
-    hand.main.run_until(lambda: tool.preview._search is not None)
-    search = tool.preview._search
+    hand.main.run_until(lambda: tool.preview.search is not None)
+    search = tool.preview.search
     assert tool.found is None and not hand.context.hud.text
     looked_for(hand, 0.5)
     hand.tools.choose("handle")
-    assert tool.preview._search is search and tool.found is None
+    assert tool.preview.search is search and tool.found is None
 
 
 def test_another_tool_takes_the_tint_away(hand):
@@ -165,5 +165,5 @@ def test_another_tool_stops_the_looking(hand, monkeypatch):
     assert begun.wait(60.0)
     hand.tools.choose("handle")
     go_on.set()
-    hand.main.run_until(lambda: not tool.preview._searches.is_busy)
+    hand.main.run_until(lambda: not tool.preview.is_looking)
     assert ended == ["cancelled"] and tool.found is None

@@ -94,7 +94,7 @@ def test_a_floor_that_was_left_before_it_was_found_is_not_shown(hand):
     tool = taken_up(hand, "level")
     hand.click(hand.surface())
     assert hand.key("Esc") and not hand.context.hud.text
-    hand.main.run_until(lambda: not tool._job.is_busy)
+    hand.main.run_until(lambda: not tool.is_looking)
     assert hand.scene.preview is None and not hand.key("Return")
 
 

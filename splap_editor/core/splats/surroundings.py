@@ -25,10 +25,10 @@ _BLOCK_NODES = 1 << 16
 _PARTS = 4
 """Into so many the splats are split, to be looked at side by side."""
 
-_THICKNESS = 0.1
+THICKNESS = 0.1
 """How far a splat reaches out of its plane, in units of its larger semi-axis."""
 
-_STRAY = (1.0, 2.5)
+STRAY = (1.0, 2.5)
 """Neighbours hang together if they lie no farther apart than so many times the spacing about either: a narrow measure
 that haze over a surface does not meet, and a wide one for where the density of a surface changes."""
 
@@ -137,12 +137,12 @@ def surroundings(ellipses: Ellipses, *, progress: Progress = no_progress, run: R
     """
     n, centers = ellipses.n_nodes, ellipses.centers
     neighbors, distances = nearest(centers, part_of(progress, 0.0, 0.75), run)
-    local, ties = np.empty((n, len(LOCAL))), np.zeros((len(_STRAY), *neighbors.shape), np.bool_)
+    local, ties = np.empty((n, len(LOCAL))), np.zeros((len(STRAY), *neighbors.shape), np.bool_)
     reaches = np.maximum(ellipses.reaches, 1e-12 * ellipses.scene_scale)
     known = neighbors, distances, centers, ellipses.semi_axes, ellipses.normals, reaches, bounded_logits(ellipses)
 
     def look(first: int, end: int, progress: Progress) -> None:
-        _local(first, end, *known, np.array(_STRAY), local, ties)
+        _local(first, end, *known, np.array(STRAY), local, ties)
 
     _in_parts(look, n, part_of(progress, 0.75, 1.0), run)
     return Surroundings(distances, local, Ties(neighbors, ties[0]), Ties(neighbors, ties[1]))
@@ -217,8 +217,8 @@ def _local(first, end, neighbors, distances, centers, semi_axes, normals, reache
             if d > 0.0:
                 out += abs(over_j) / d
                 flat += abs(over_i) / d
-                reach = np.sqrt(along_i * along_i + across_i * across_i + (_THICKNESS * own * d) ** 2)
-                reach += np.sqrt(along_j * along_j + across_j * across_j + (_THICKNESS * reaches[j] * d) ** 2)
+                reach = np.sqrt(along_i * along_i + across_i * across_i + (THICKNESS * own * d) ** 2)
+                reach += np.sqrt(along_j * along_j + across_j * across_j + (THICKNESS * reaches[j] * d) ** 2)
                 touches = d * d <= reach
             else:
                 touches = True

@@ -58,8 +58,8 @@ def test_what_is_known_of_a_splat_among_its_nearest_is_as_the_slow_twin_says(sce
     ways = np.linalg.norm(ellipses.centers[:, None] - ellipses.centers, axis=2)
     np.testing.assert_allclose(distances, np.sort(ways, axis=1)[:, 1 : 1 + surroundings.N_NEAREST])
     assert not (neighbors == np.arange(ellipses.n_nodes)[:, None]).any()
-    logits, strays = surroundings.bounded_logits(ellipses), surroundings._STRAY
-    slow, slow_ties = local_evidence(neighbors, distances, ellipses, logits, surroundings._THICKNESS, strays)
+    logits, strays = surroundings.bounded_logits(ellipses), surroundings.STRAY
+    slow, slow_ties = local_evidence(neighbors, distances, ellipses, logits, surroundings.THICKNESS, strays)
     np.testing.assert_allclose(around.local, slow, atol=1e-9)
     for found, ties in zip((around.narrow, around.wide), slow_ties, strict=True):
         np.testing.assert_array_equal(found.tied, ties)
