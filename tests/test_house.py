@@ -100,6 +100,8 @@ def hidden_names(tree):
                 pass
             case ast.Attribute(value=ast.Name(id="os"), attr="_exit"):
                 pass
+            case ast.Attribute(attr="_replace" | "_asdict" | "_fields"):
+                pass  # a named tuple's own
             case ast.Attribute(attr=name):
                 names = [name]
             case ast.ImportFrom(module=module, names=aliases):
