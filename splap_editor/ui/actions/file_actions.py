@@ -154,7 +154,7 @@ class FileActions:
             f"Your work on {scene.file.path.name} has not been saved.",
             parent=self._window,
         )
-        is_exported = not self._session.has_unexported_edit
+        is_exported = not (scene.edit.is_identity or self._session.has_unexported_edit)
         box.setInformativeText(
             "An export keeps the shape, not what it was made by: handles, pins and keys are lost when another file is "
             "opened or the window is closed."
