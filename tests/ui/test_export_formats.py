@@ -136,6 +136,11 @@ def test_an_ending_typed_chooses_its_format_and_one_only_read_is_refused(dialog,
     assert Path(dialog.path).suffix == ".splat"
 
 
+def test_what_is_typed_first_replaces_the_suggestion(dialog, qtbot, tmp_path):
+    qtbot.keyClicks(dialog.path_field, str(tmp_path / "typed.ply"))
+    assert dialog.path == tmp_path / "typed.ply"
+
+
 def test_a_format_chosen_without_a_name_goes_by_the_one_suggested(dialog, tmp_path):
     dialog.path_field.clear()
     choose(dialog.choice, "spz")

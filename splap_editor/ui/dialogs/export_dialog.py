@@ -51,6 +51,9 @@ class ExportDialog(QDialog):
         self._source, self._suggested = scene.file.path, suggested
         self.path_field = QLineEdit(str(suggested))
         self.path_field.setMinimumWidth(420)
+        # What is typed first replaces the suggestion; a click keeps it to be changed.
+        self.path_field.setFocus()
+        self.path_field.selectAll()
         self.browse_button = browse = QPushButton("Browse…")
         browse.setAutoDefault(False)
         browse.clicked.connect(self._on_browse_clicked)
