@@ -69,13 +69,12 @@ class FloatersTool(Tool):
 
     def taken_up(self) -> None:
         """Begin to look."""
-        self._is_in_use = True
         if self.context.session.scene is not None:
             self.begin()
 
     def begin(self) -> None:
         """Look for floaters among what is left."""
-        self._is_dismissed = False
+        self._is_in_use, self._is_dismissed = True, False
         if not self.preview.is_shown:
             self.context.hud.show(text="Looking for floaters …")
             self.preview.show(self._strength.value.strength)
@@ -88,7 +87,6 @@ class FloatersTool(Tool):
 
     def hover(self, event: PointerEvent) -> bool:
         """Begin to look, as after others were removed."""
-        self._is_in_use = True
         if not self._is_dismissed:
             self.begin()
         return False

@@ -66,7 +66,7 @@ def test_another_up_axis_is_a_step_that_undo_takes_back_with_the_view(driver):
 def test_level_and_true_size_by_hand(driver, qtbot):
     driver.key(Qt.Key.Key_T, Qt.KeyboardModifier.ShiftModifier)
     driver.click(driver.surface_pixel())
-    assert driver.scene.preview is not None
+    qtbot.waitUntil(lambda: driver.scene.preview is not None, timeout=WAIT_MS)
     driver.key(Qt.Key.Key_Return)
     assert driver.session.history.undo_label == "Level object" and driver.scene.preview is None
     driver.key(Qt.Key.Key_M)
