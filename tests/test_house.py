@@ -1,11 +1,16 @@
 """Rules of the house that no linter knows, read off the source: of tests, of compiled loops."""
 
 import ast
+import re
 from functools import cache
 from pathlib import Path
 
+import pytest
+
 import splap_editor
 from tests.kinds import TESTS
+
+WORKFLOWS = TESTS.parent / ".github" / "workflows"
 
 CHECKS = ("raises", "warns", "waitUntil", "waitSignal", "run_until")
 """Calls that fail a test, beside those named assert…"""
@@ -118,6 +123,15 @@ def test_no_test_reads_what_is_private():
     assert found == []
     sample = "x._a; self._b; self.x._c; os._exit; from y import _d; m.setattr('z._e', 1); getattr(z, '_f'); x.__g__"
     assert [name for _, name in hidden_names(ast.parse(sample.replace("; ", "\n")))] == ["_d", "_a", "_c", "_e", "_f"]
+
+
+@pytest.mark.skipif(not WORKFLOWS.is_dir(), reason="a source archive has none")
+def test_what_the_workflows_leave_out_is_there():
+    named = [word for path in WORKFLOWS.glob("*.yml") for word in re.findall(r"tests/[\w/.:]+", path.read_text())]
+    assert len(named) > 5
+    for path, _, test in (word.partition("::") for word in named):
+        there = TESTS.parent / path
+        assert there.exists() and (not test or f"def {test}(" in there.read_text(encoding="utf-8")), path + test
 
 
 def test_each_compiled_loop_says_what_it_does():
