@@ -11,7 +11,7 @@ HandleT = TypeVar("HandleT")
 PinT = TypeVar("PinT")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BaseEdit(Generic[HandleT, PinT]):
     """Which splats are moved where, what stays, and how the rest follows.
 

@@ -72,6 +72,14 @@ def test_an_edit_never_changes():
     assert edit.next_handle_id() == 2
 
 
+def test_an_edit_equals_itself_alone():
+    # What tells that something has changed goes by it, and a key or a removal is no field of the base.
+    edit = Edit()
+    assert edit == edit
+    assert replace(edit, timeline=replace(edit.timeline, frame=7)) != edit
+    assert len({edit, replace(edit)}) == 2
+
+
 def test_pins_are_found_changed_and_dropped_one_by_one():
     first, second = (Pin(i, f"Pin {i}", Region(np.zeros(3), 0.1)) for i in (1, 2))
     edit = Edit().with_pin(first).with_pin(second)
