@@ -61,7 +61,9 @@ def _installed(folder: Path) -> str:
 
 def _misread(program: str, folder: Path) -> int:
     """Hand over layouts that only 3DGS programs would misread, made plain for them; gives the number of failures."""
-    file = read_splats(resource("samples", "tube.ply"))
+    thick, flat = folder / "thick.ply", read_splats(resource("samples", "tube.ply"))
+    write_splats(thick, flat, flat.splats, as_3dgs=True)
+    file = read_splats(thick)
     splats, failures = file.splats, 0
     opacities = {"opacity": alphas_of(splats.logit_opacities).astype("f4")}
     changes = {"spikinggs": opacities, "gof": {"filter_3D": np.full(splats.n_splats, 0.004, "f4")}}
