@@ -114,9 +114,9 @@ class _Animation:
         """Its JSON."""
         return {"name": "timeline", "samplers": self._samplers, "channels": self._channels}
 
-    def move(self, node: int, path: str, values: NDArray[np.floating]) -> None:
-        """Move a property of a node."""
-        self._add({"node": node, "path": path}, values)
+    def move(self, number: int, path: str, values: NDArray[np.floating]) -> None:
+        """Move a property of the document's node of a number."""
+        self._add({"node": number, "path": path}, values)
 
     def change(self, pointer: str, values: NDArray[np.floating]) -> None:
         """Change another number of the document, for programs that know `POINTER`."""
