@@ -64,7 +64,9 @@ def test_click_drag_undo_and_export_give_a_file_with_what_was_on_screen(driver, 
     qtbot.waitUntil(lambda: window.toast.text.startswith("Exported"), timeout=60_000)
     # The file holds float32.
     np.testing.assert_allclose(read_ply(target).splats.means, scene.kernels.means, atol=1e-6)
-    assert not window.isWindowModified()
+    assert not driver.session.has_unexported_edit
+    # An export keeps no handle.
+    assert window.isWindowModified()
 
 
 def test_escape_during_a_drag_leaves_pose_and_history_as_they_were(driver, qtbot):
