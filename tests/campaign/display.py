@@ -19,5 +19,7 @@ def display() -> Iterator[str | None]:
         os.close(writer)
         with os.fdopen(reader) as numbers:
             number = numbers.readline().strip()
-        yield f":{number}"
-        process.kill()
+        try:
+            yield f":{number}"
+        finally:
+            process.kill()
