@@ -146,7 +146,8 @@ def try_inputs(
                 continue
             n_to_show += 1
             if n_to_show % shown_share == 0:
-                workers += [Worker(seed, "tests.campaign.window", display)] * (len(workers) == 1)
+                if len(workers) == 1:
+                    workers.append(Worker(seed, "tests.campaign.window", display))
                 _tried(workers[1], seed, kind, number, found)
                 found.counts["windows"] += 1
     finally:
