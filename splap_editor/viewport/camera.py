@@ -166,7 +166,8 @@ def framed(view: View, points: ArrayLike, aspect: float, *, room: float = 0.0, m
     needed = margin * np.maximum(up, right / aspect) / slope
     if not view.is_parallel:
         needed = needed - view.direction @ columns
-    distance = max(float(needed.max()), 1e-9)
+    # Far from the origin a smaller step would be lost in rounding, and eye and focal point would be one.
+    distance = max(float(needed.max()), 1e-9, 1e-9 * float(np.abs(center).max()))
     return replace(view, focal_point=center, position=center - distance * view.direction)
 
 

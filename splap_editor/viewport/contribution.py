@@ -39,8 +39,9 @@ def contribution(glyphs: Glyphs, colors: NDArray[np.uint8]) -> Contribution:
     colors : (N, 4) uint8
         The fourth is the opacity.
     """
-    u, v = np.asarray(glyphs.axes_u, np.float32), np.asarray(glyphs.axes_v, np.float32)
-    areas = np.linalg.norm(np.cross(u, v), axis=1) * np.square(glyphs.cutoffs, dtype=np.float32)
+    # The area of a splat that may be read goes beyond what single precision holds.
+    u, v = np.asarray(glyphs.axes_u, np.float64), np.asarray(glyphs.axes_v, np.float64)
+    areas = np.linalg.norm(np.cross(u, v), axis=1) * np.square(glyphs.cutoffs, dtype=np.float64)
     rows = np.argsort(-areas * colors[:, 3], kind="stable").astype(np.int32)
     covered = np.cumsum(areas[rows], dtype=np.float64)
     if len(covered) and covered[-1] > 0.0:

@@ -186,6 +186,8 @@ class Viewport:
         toward = 0.55 * side + 0.80 * np.cross(side, up) + 0.38 * up
         axes = self.camera.axes
         toward, up = toward @ axes, up @ axes
+        # Only its direction counts; far from the origin a step of one unit would be lost in rounding.
+        toward *= max(1.0, float(np.abs(actor.origin).max()))
         home = replace(self.camera.home, position=actor.origin + toward, focal_point=actor.origin, view_up=up)
         self.camera.view = replace(home, is_parallel=self.camera.view.is_parallel)
         self.camera.view = self.camera.home = self.frame()

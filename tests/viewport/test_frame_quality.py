@@ -82,3 +82,10 @@ def test_what_is_drawn_is_what_gives_most_wherever_it_lies():
     assert (np.diff(gives) <= 1e-5 * gives[0]).all()
     assert sorted(order.rows) == list(range(n))
     assert order.share(0) == 0.0 and order.share(n) == pytest.approx(1.0)
+
+
+def test_splats_as_large_as_may_be_read_have_their_share_too():
+    u, v = np.array([[1e30, 0.0, 0.0], [1e35, 0.0, 0.0]]), np.array([[0.0, 1e30, 0.0], [0.0, 1e35, 0.0]])
+    order = contribution(Glyphs(np.zeros((2, 3)), u, v, np.zeros(2), np.ones(2)), np.full((2, 4), 255, np.uint8))
+    assert list(order.rows) == [1, 0]
+    assert order.share(1) == pytest.approx(1.0) and order.share(2) == 1.0

@@ -238,6 +238,16 @@ def test_reset_camera_shows_the_scene_upright_from_its_front():
             assert (pixels > 0).all() and (pixels < viewport.renderer.GetSize()).all()
 
 
+def test_home_looks_along_its_direction_however_far_away_the_scene_is():
+    glyphs, rgba = random_splats(50)
+    with canvas(glyphs, rgba) as viewport:
+        viewport.reset_camera()
+        direction = viewport.camera.view.direction
+    with canvas(replace(glyphs, means=glyphs.means + np.array([1e26, 0.0, -3e20])), rgba) as viewport:
+        viewport.reset_camera()
+        np.testing.assert_allclose(viewport.camera.view.direction, direction, atol=1e-6)
+
+
 def test_closing_gives_the_host_its_window_back():
     with canvas() as viewport:
         window, renderer = viewport.renderer.GetRenderWindow(), vtkRenderer()
