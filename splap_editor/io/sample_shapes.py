@@ -141,12 +141,17 @@ def extruded_sheet(profile: NDArray[np.float64], depth: float, *, spacing: float
 
 
 def level_set(
-    distance: Callable[[NDArray[np.float64]], NDArray[np.float64]], *, spacing: float, reach: float = 1.36
+    distance: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    *,
+    spacing: float,
+    reach: float = 1.36,
+    is_distance: bool = False,
 ) -> Surface:
     """Zero set of a signed distance-like function, negative inside, with well-shaped triangles.
 
     Marching cubes leaves slivers; a few rounds of averaging over neighbours, each followed by a step back onto
-    the zero set, round them out.
+    the zero set, round them out. What nowhere changes faster than by the way gone (``is_distance``) is asked near the
+    zero set alone, with the same result.
     """
     import igl
 
@@ -154,7 +159,8 @@ def level_set(
     n = len(ticks)
     # The first coordinate varies fastest: igl's order of grid corners.
     grid = np.stack(np.meshgrid(ticks, ticks, ticks, indexing="ij"), -1).transpose(2, 1, 0, 3).reshape(-1, 3)
-    vertices, faces, _ = igl.marching_cubes(distance(grid), np.ascontiguousarray(grid), n, n, n, 0.0)
+    values = _values_near_zero(distance, ticks) if is_distance else distance(grid)
+    vertices, faces, _ = igl.marching_cubes(values, np.ascontiguousarray(grid), n, n, n, 0.0)
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     counts = np.bincount(edges[:, 0], minlength=len(vertices))[:, None]
     for _ in range(10):
@@ -164,6 +170,25 @@ def level_set(
         vertices = _projected(distance, 0.4 * vertices + 0.6 * averages / counts, spacing)
     surface = Surface(vertices, faces.astype(np.int64))
     return surface if surface.volume > 0 else Surface(vertices, surface.faces[:, ::-1])
+
+
+def _values_near_zero(
+    distance: Callable[[NDArray[np.float64]], NDArray[np.float64]], ticks: NDArray[np.float64], block: int = 8
+) -> NDArray[np.float64]:
+    """Values on a cubic grid, first coordinate fastest; of a block that the zero set stays clear of, its middle's."""
+    n, spacing = len(ticks), ticks[1] - ticks[0]
+    lows = np.arange(0, n, block)
+    middles = ticks[0] + spacing * (lows + 0.5 * (block - 1))
+    coarse = distance(np.stack(np.meshgrid(middles, middles, middles, indexing="ij"), -1).reshape(-1, 3))
+    coarse = coarse.reshape([len(lows)] * 3)
+    values = coarse.repeat(block, axis=0).repeat(block, axis=1).repeat(block, axis=2)[:n, :n, :n]
+    # From the middle to a corner of the block, and on to the far corner of a cell that reaches beyond it.
+    near = np.argwhere(abs(coarse) <= np.sqrt(3.0) * spacing * (0.5 * (block - 1) + 1.0))
+    within = np.stack(np.meshgrid(*[np.arange(block)] * 3, indexing="ij"), -1).reshape(-1, 3)
+    places = (near[:, None] * block + within).reshape(-1, 3)
+    places = places[(places < n).all(axis=1)]
+    values[tuple(places.T)] = distance(ticks[places])
+    return values.transpose(2, 1, 0).reshape(-1)
 
 
 def _projected(

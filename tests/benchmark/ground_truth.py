@@ -145,6 +145,11 @@ class GroundTruth:
                 return [self._pull(*found[index]) for index in chosen]
         raise ValueError("the surface comes close to itself nowhere")
 
+    def spread_pulls(self, n_pulls: int) -> list[Pull]:
+        """Handles at farthest points, each pushed 0.2 s out along the normal."""
+        chosen = farthest_points(self.vertices, n_pulls)
+        return [self._pull(vertex, 0.2 * self.size * self.normals[vertex]) for vertex in chosen]
+
     def _away(self, vertex: int, gap: float, detour: float) -> NDArray[np.float64] | None:
         """0.2 s away from the nearest surface facing the vertex, if that is near in space and far along the surface."""
         close = np.array(self.tree.query_ball_point(self.vertices[vertex], gap))

@@ -37,6 +37,10 @@ class MadeObject:
         """Number of splats at which the gap is so many splat spacings wide."""
         return int(self.surface.areas.sum() * (spacings / self.gap) ** 2)
 
+    def spacings(self, n_splats: int) -> float:
+        """How many splat spacings wide the gap is among so many splats."""
+        return float(self.gap / np.sqrt(self.surface.areas.sum() / n_splats))
+
 
 def _rod(a: Sequence[float], b: Sequence[float], radius: float) -> Distance:
     """A round bar from a to b."""
@@ -93,7 +97,7 @@ def _union(parts: Sequence[Distance], spacing: float) -> Surface:
             np.minimum(nearest, part(points), out=nearest)
         return nearest
 
-    return level_set(distance, spacing=spacing)
+    return level_set(distance, spacing=spacing, is_distance=True)
 
 
 def _row(n: int, width: float, gap: float) -> NDArray[np.float64]:
