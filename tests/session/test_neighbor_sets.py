@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from splap_editor.core.graph.splat_graph import GraphOptions
+from splap_editor.core.graph.carriers import carrying
+from splap_editor.core.graph.splat_graph import GraphOptions, SplatGraph, splat_graph
+from splap_editor.core.surface.geodesics import geodesic_distances
 from splap_editor.core.surface.neighborhoods import NORMAL_SHARE
 from splap_editor.engine.surface import Surface, surface_of
 from splap_editor.io.ply import read_ply
@@ -48,6 +50,30 @@ def test_graph_neighbours_are_the_row_of_the_matrix(surface):
     np.testing.assert_array_equal(np.sort(near), row)
     lengths = np.linalg.norm(surface.ellipses.centers[near] - surface.ellipses.centers[55], axis=1)
     assert (np.diff(lengths) >= 0).all()
+
+
+@pytest.fixture(scope="module")
+def paper(surface) -> SplatGraph:
+    return splat_graph(surface.ellipses, GraphOptions(rule="paper"))
+
+
+@pytest.mark.parametrize("node", [0, 777, 2000])
+@pytest.mark.parametrize("k", [6, 40])
+def test_what_is_made_of_the_papers_graph_about_a_node_answers_as_the_whole_graph(surface, paper, node, k):
+    joined, near = neighbors(surface, "paper-graph", node), neighbors(surface, "paper", node, k)
+    np.testing.assert_array_equal(np.sort(joined), paper.matrix()[[node]].indices)
+    ways = geodesic_distances(paper, np.array([node])).ravel()
+    np.testing.assert_allclose(ways[near], np.sort(np.delete(ways, node))[:k], rtol=1e-12)
+    assert len(set(near.tolist())) == k
+
+
+def test_a_small_part_by_the_papers_rule_has_fewer_neighbours_than_asked_for(surface):
+    ends = np.flatnonzero(surface.ellipses.centers[:, 0] > np.quantile(surface.ellipses.centers[:, 0], 0.98))
+    among = np.zeros(surface.ellipses.n_nodes, bool)
+    among[ends] = True
+    part = carrying(surface.ellipses, among)
+    near = neighbor_set("paper", 0, part, surface.graph, surface.neighborhoods, k=1000)
+    assert 0 < len(near) < part.n_nodes and 0 not in near
 
 
 def test_geodesic_ones_at_hand_and_searched_for_are_the_same(surface):

@@ -244,7 +244,14 @@ def _gap_words(card: EdgeCard) -> str:
 
 
 def _words(kind: str) -> str:
-    return {"graph": "graph", "geodesic": "surface", "euclidean": "space", "mahalanobis": "Mahalanobis"}[kind]
+    return {
+        "graph": "graph",
+        "geodesic": "surface",
+        "paper-graph": "paper's graph",
+        "paper": "paper's surface",
+        "euclidean": "space",
+        "mahalanobis": "Mahalanobis",
+    }[kind]
 
 
 def _kind_combo(tip: str, none: str = "") -> QComboBox:
