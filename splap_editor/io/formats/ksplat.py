@@ -140,7 +140,7 @@ def _section(source: Source, level: _Level, head: int, at: int) -> tuple[_Sectio
     ends = min(n_full * capacity, n) + np.cumsum(partial)
     found = _Section(records, degree, centers, capacity, n_full, ends, block / 2 / reach, reach)
     # Buckets follow one another: the last row has the last of them.
-    if len(centers) and found.buckets(n - 1, n)[0] >= len(centers):
+    if n and level.position_range > 1 and found.buckets(n - 1, n)[0] >= len(centers):
         raise source.damaged("a section has splats outside its buckets")
     return found, start + record.itemsize * most
 

@@ -196,6 +196,16 @@ def test_a_ksplat_cut_short_or_of_foreign_counts_is_refused(tmp_path):
             read_splats(tmp_path / "bad.ksplat")
 
 
+def test_a_ksplat_of_splats_without_buckets_is_refused(tmp_path):
+    data = bytearray(4096 + 1024 + 64)
+    data[1] = 1
+    struct.pack_into("<IIIIH", data, 4, 1, 1, 1, 1, 1)
+    struct.pack_into("<IIIIfH", data, 4096, 1, 1, 1, 0, 5.0, 12)
+    (tmp_path / "bad.ksplat").write_bytes(data)
+    with pytest.raises(FormatError, match="splats outside its buckets"):
+        read_splats(tmp_path / "bad.ksplat")
+
+
 @pytest.mark.parametrize("name", ["nothing.ply", "photo.jpeg", "text"])
 def test_what_is_no_splat_file_is_refused_as_a_ply(tmp_path, name):
     (tmp_path / name).write_bytes(b"some text that is no splat at all, and long enough to be one")
