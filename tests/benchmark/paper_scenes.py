@@ -4,6 +4,7 @@ import argparse
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import product
+from math import gcd
 from pathlib import Path
 
 import numpy as np
@@ -85,11 +86,13 @@ def made_cases(options: argparse.Namespace) -> list[Case]:
     cells = sorted(
         product(range(n_regimes), range(n_spacings)), key=lambda cell: ((cell[1] - cell[0]) % n_spacings, cell[0])
     )
+    # Through all pairs before any comes again, whatever their number.
+    stride = next(step for step in range(n_regimes + 1, 2 * len(cells) + 3) if gcd(step, len(cells)) == 1)
     cases = []
     for turn in range(min(options.cells or len(cells), len(cells))):
         for seed in range(options.seeds):
             for category in options.categories:
-                first = seed + (n_regimes + 1) * list(CATEGORIES).index(category)
+                first = seed + stride * list(CATEGORIES).index(category)
                 regime, density = cells[(turn + first) % len(cells)]
                 cases.append(Case(category, seed, regimes[regime], options.spacings[density]))
     return cases
