@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -82,9 +83,15 @@ def joint_contacts(ellipses: Ellipses, graph: SplatGraph, joint: Joint) -> Nodes
 
 def nodes_at(ellipses: Ellipses, points: Iterable[Point]) -> Nodes:
     """Nodes nearest to some points, ascending, each once."""
-    # A tree that is asked but a few times need not be a good one.
-    tree = cKDTree(ellipses.centers, balanced_tree=False, compact_nodes=False)
+    tree = _TREES.get(ellipses)
+    if tree is None:
+        # A tree that is asked but a few times need not be a good one.
+        tree = _TREES[ellipses] = cKDTree(ellipses.centers, balanced_tree=False, compact_nodes=False)
     return np.unique(tree.query(np.array(list(points), np.float64).reshape(-1, 3))[1]).astype(np.int64)
+
+
+_TREES: WeakKeyDictionary[Ellipses, cKDTree] = WeakKeyDictionary()
+"""Over the centres of the scenes that are open: a second stroke need not wait for it."""
 
 
 def row_pairs(ellipses: Ellipses, edges: Nodes) -> set[RowPair]:

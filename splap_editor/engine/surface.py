@@ -13,7 +13,7 @@ from splap_editor.core.adaptation.kernel_binding import KernelBinding
 from splap_editor.core.graph.carriers import carriers_of, carrying
 from splap_editor.core.graph.options import GRAPH_RULES, LAPLACIANS, NEIGHBORHOODS, GraphOptions
 from splap_editor.core.graph.splat_graph import SplatGraph, require_mendable
-from splap_editor.core.index_spaces import FileMask, RowPair
+from splap_editor.core.index_spaces import FileMask, Nodes, RowPair
 from splap_editor.core.kept_arrays import Arrays
 from splap_editor.core.progress import Guard, StageProgress, silent, unguarded
 from splap_editor.core.splats.occupancy import Ellipses, occupancy_ellipses
@@ -51,6 +51,8 @@ class Surface:
         Hash of everything the above was made from.
     options : GraphOptions
         What the graph was asked for with; its stages name no splat that is removed.
+    plain_key : str
+        Hash of what it would be made from without mends.
     timings_s : dict
         Seconds of each stage made, not loaded.
     """
@@ -61,6 +63,7 @@ class Surface:
     binding: KernelBinding
     key: str
     options: GraphOptions
+    plain_key: str
     timings_s: dict[str, float] = field(default_factory=dict)
     _shared: dict[Callable[["Surface"], Any], Any] = field(default_factory=dict, repr=False)
 
@@ -164,11 +167,14 @@ def surface_of(
         ellipses = carrying(visible, carries)
     require_mendable(ellipses, options)
     # Tolerances are in units of the scene's size, which opacities have a say in too.
-    made_from = (ellipses.centers, ellipses.semi_axes, ellipses.rows, ellipses.scene_scale)
-    key = content_key((_made_by(plain), *made_from, plain))
+    binding: KernelBinding | None = None
     if near is not None and near.ellipses is ellipses and unmended(near.options) == plain:
-        made = near.stages
+        made, plain_key = near.stages, near.plain_key
+        if near.binding.splats is splats:
+            binding = near.binding
     else:
+        made_from = (ellipses.centers, ellipses.semi_axes, ellipses.rows, ellipses.scene_scale)
+        plain_key = content_key((_made_by(plain), *made_from, plain))
 
         def make() -> SurfaceStages:
             return plain_stages(ellipses, options, timed, stages, alone)
@@ -176,14 +182,17 @@ def surface_of(
         def unpacked(arrays: Arrays) -> SurfaceStages:
             return unpacked_stages(arrays, options, ellipses.n_nodes)
 
-        made = make() if cache is None else cache.kept(key, make, packed_stages, unpacked)
+        made = make() if cache is None else cache.kept(plain_key, make, packed_stages, unpacked)
+    stale: Nodes | None = np.zeros(0, np.int64)
     if made.options != options:
-        made = mended_stages(ellipses, made, options, timed, stages, alone)
-    if options != plain:
-        key = content_key((key, options))
+        made, stale = mended_stages(ellipses, made, options, timed, stages, alone)
+    key = plain_key if options == plain else content_key((plain_key, options))
     with timed("kernels"):
-        binding = KernelBinding(splats, ellipses, made.neighborhoods, graph=made.graph, progress=stages("kernels"))
-    return Surface(ellipses, visible, made, binding, key, asked, timings)
+        if binding is None or stale is None:
+            binding = KernelBinding(splats, ellipses, made.neighborhoods, graph=made.graph, progress=stages("kernels"))
+        else:
+            binding = binding.mended(made.neighborhoods, made.graph, stale)
+    return Surface(ellipses, visible, made, binding, key, asked, plain_key, timings)
 
 
 def _require_visible(ellipses: Ellipses) -> None:

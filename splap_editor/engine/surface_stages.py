@@ -86,10 +86,11 @@ def mended_stages(
     timed: Timed,
     stages: StageProgress,
     alone: Guard = unguarded,
-) -> SurfaceStages:
+) -> tuple[SurfaceStages, Nodes | None]:
     """Go on from stages that differ in cut and added edges and strokes only: to the bit what all stages would give.
 
-    The graph is not searched again, geodesics and stars only where a changed edge reaches.
+    The graph is not searched again, geodesics and stars only where a changed edge reaches: at the nodes given beside
+    the stages; None if everywhere.
     """
     with timed("mends"):
         progress = stages("mends")
@@ -115,7 +116,7 @@ def mended_stages(
             L, M = loaded(mended)(ellipses.centers, triangles, graph, stale, *were)
         else:
             L, M = point_cloud_laplacian(ellipses.centers, triangles, graph=graph, method=options.laplacian)
-    return SurfaceStages(options, before.unmended, graph, neighborhoods, triangles, L, M, mends)
+    return SurfaceStages(options, before.unmended, graph, neighborhoods, triangles, L, M, mends), stale
 
 
 def _changed_ends(ellipses: Ellipses, before: GraphOptions, after: GraphOptions) -> Nodes:

@@ -8,6 +8,7 @@ or between what is near along it; one that is planted counts as missed only if t
     python -m tests.benchmark.planted                     # objects and seeds that nothing was fitted on
     python -m tests.benchmark.planted --fit               # print the numbers of core/surface/tears.py and webs.py
     python -m tests.benchmark.planted --everyday FOLDER   # drags of everyday size on trained scenes: what is told
+    python -m tests.benchmark.planted --captures FOLDER   # the same of NAME.ply with a NAME_truth.npz
     python -m tests.benchmark.planted --speed 20000 100000
 """
 
@@ -35,6 +36,7 @@ from splap_editor.engine.edit import Edit, Handle
 from splap_editor.engine.surface import Surface, surface_of
 from splap_editor.io.ply import read_ply
 from splap_editor.io.sample_maker import STYLES, shape_sample, surface_splats
+from tests.benchmark.fidelity import capture, held
 from tests.benchmark.ground_truth import GroundTruth, Pull
 from tests.benchmark.paper_objects import CATEGORIES, made_object
 
@@ -96,18 +98,22 @@ class Case:
 class Planting:
     """A scene with a true surface, in which contacts can be planted."""
 
-    def __init__(self, name: str, style: str, seed: int) -> None:
-        self.name, self.rng = f"{name} {style}", np.random.default_rng([seed, 5])
+    def __init__(self, name: str, splats: Splats, truth: GroundTruth, seed: int = 0) -> None:
+        self.name, self.rng = name, np.random.default_rng([seed, 5])
+        self.splats, self.truth = splats, truth
+        self.plain = surface_of(splats, GraphOptions())
+        self.vertices = truth.vertices_of(self.plain.rest)
+        self.seed = seed
+
+    @classmethod
+    def made(cls, name: str, style: str, seed: int) -> "Planting":
+        """Lay splats on an object."""
         if name in CATEGORIES:
             made = made_object(name, seed)
             sample = surface_splats(made.surface, int(np.clip(made.n_splats(2.0), *_SPLATS)), STYLES[style], seed=seed)
         else:
             sample = shape_sample(name, _SPLATS[1], STYLES[style], seed=seed)
-        self.splats: Splats = sample.splats
-        self.truth = GroundTruth(sample.surface)
-        self.plain = surface_of(self.splats, GraphOptions())
-        self.vertices = self.truth.vertices_of(self.plain.rest)
-        self.seed = seed
+        return cls(f"{name} {style}", sample.splats, GroundTruth(sample.surface), seed)
 
     def cases(self, n_pulls: int) -> Iterator[Case]:
         """Pose the scene as it is, and with contacts planted; every other pull is half as far."""
@@ -209,7 +215,7 @@ def measured(n_pulls: int) -> None:
     """Print precision and recall of held-out scenes."""
     told: Counter[tuple[str, str]] = Counter()
     for name, style, seed in HELD_OUT:
-        planting, own = Planting(name, style, seed), Counter[tuple[str, str]]()
+        planting, own = Planting.made(name, style, seed), Counter[tuple[str, str]]()
         for case in planting.cases(n_pulls):
             places = posed_check(case.posed).places
             for place in places:
@@ -241,11 +247,49 @@ def _tell(name: str, counts: Counter[tuple[str, str]]) -> None:
     print(f"{name}: {'; '.join(parts)}; {counts['spike', 'right']} spikes", flush=True)
 
 
+def captures(folder: Path) -> None:
+    """Print what is told of trained captures whose surface is known, pulled as far as their references and half so."""
+    told: Counter[tuple[str, str]] = Counter()
+    for path in sorted(folder.glob("*_truth.npz")):
+        stem = path.name.removesuffix("_truth.npz")
+        scene = capture(*stem.rsplit("_", 1), read_ply(path.with_name(f"{stem}.ply")).splats, np.load(path))
+        planting = Planting(stem, scene.splats, scene.truth)
+        own = Counter[tuple[str, str]]()
+        for k, pull in enumerate(scene.pulls):
+            nodes = np.flatnonzero(held(scene, pull, planting.plain.rest)[0])
+            for share in (0.5, 1.0):
+                posed = _pulled(planting.plain, nodes, share * pull.move)
+                own += _told_of(planting, f"{stem}, pull {k + 1} × {share}", Case("none", posed, posed))
+        _tell(stem, own)
+        told += own
+    _tell("all", told)
+
+
+def _told_of(planting: Planting, title: str, case: Case) -> Counter[tuple[str, str]]:
+    """What is told of a capture's pose; of webs, what is shown are wrong contacts drawn out by more than `SHOWN`."""
+    own, surface, places = Counter[tuple[str, str]](), case.surface, posed_check(case.posed).places
+    for place in places:
+        right = "right" if place.kind == "spike" or planting.is_right(case, place) else "wrong"
+        own[place.kind, right] += 1
+        print(f"{title}: {place}: {right}", flush=True)
+    edges = surface.graph.edges
+    assert case.posed.deformation is not None
+    lengths = [
+        np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+        for points in (surface.rest, case.posed.deformation.positions)
+    ]
+    drawn = edges[lengths[1] - lengths[0] > SHOWN * planting.truth.size]
+    for edge in drawn[~planting.near(drawn, 2.5, 0.04)]:
+        own["web", "shown"] += 1
+        own["web", "found"] += _is_found(planting, "web", places, edge)
+    return own
+
+
 def fit(n_pulls: int) -> None:
     """Print weights of both models, fitted on the scenes for it; every pose counts alike, and so do both answers."""
     known: dict[str, list[tuple[NDArray[np.float64], NDArray[np.bool_]]]] = {"tears": [], "webs": []}
     for name, style, seed in FITTED:
-        planting = Planting(name, style, seed)
+        planting = Planting.made(name, style, seed)
         for case in planting.cases(n_pulls):
             surface, epsilon = case.surface, case.surface.graph.epsilon
             posed = posed_surface(surface, case.posed.kernels, case.posed.deformation)
@@ -310,6 +354,7 @@ def main() -> None:
     parser.add_argument("--pulls", type=int, default=2, help="handles per object (2)")
     parser.add_argument("--fit", action="store_true")
     parser.add_argument("--everyday", type=Path, metavar="FOLDER", help="of trained scenes")
+    parser.add_argument("--captures", type=Path, metavar="FOLDER", help="with true surfaces")
     parser.add_argument("--drags", type=int, default=10, help="per trained scene (10)")
     parser.add_argument("--speed", type=int, nargs="+", metavar="N")
     options = parser.parse_args()
@@ -317,6 +362,8 @@ def main() -> None:
         fit(options.pulls)
     elif options.everyday is not None:
         everyday(options.everyday, options.drags)
+    elif options.captures is not None:
+        captures(options.captures)
     elif options.speed is not None:
         speed(options.speed)
     else:

@@ -1,5 +1,6 @@
 """What carries each splat's ellipse when the surface moves: found once per scene."""
 
+from copy import copy
 from functools import cached_property
 from typing import NamedTuple
 
@@ -9,12 +10,12 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from splap_editor.core.graph.splat_graph import SplatGraph
-from splap_editor.core.index_spaces import RowsByPlace
+from splap_editor.core.index_spaces import Nodes, RowsByPlace
 from splap_editor.core.progress import Progress, no_progress
 from splap_editor.core.splats.occupancy import Ellipses, InertReason
 from splap_editor.core.splats.rotations import quats_to_matrices
 from splap_editor.core.splats.splats import Splats
-from splap_editor.core.surface.geodesics import Neighborhoods
+from splap_editor.core.surface.geodesics import Neighborhoods, node_runs
 
 STENCIL_SIZE = 6
 """Geodesic neighbours from which a node's stretch is read."""
@@ -113,16 +114,10 @@ class KernelBinding:
         self.stencils = np.empty((n, STENCIL_SIZE), np.int32)
         self.inverse_moments = np.empty((n, 6))
         self.dampings = np.empty(n)
-        indptr = np.ascontiguousarray(neighborhoods.indptr, np.int32)
-        indices = np.ascontiguousarray(neighborhoods.indices, np.int32)
+        self.neighborhoods = neighborhoods
         for lo in range(0, n, _CHUNK):
             progress(lo / n)
-            hi = min(lo + _CHUNK, n)
-            _find_carriers(lo, hi, ellipses.centers, ellipses.semi_axes, indptr, indices, self.carriers, self.weights)
-            _find_stencils(
-                lo, hi, ellipses.centers, indptr, indices, self.stencils, self.inverse_moments, self.dampings
-            )
-        self.neighborhoods = neighborhoods
+            self._bind_nodes(lo, min(lo + _CHUNK, n))
         inert_rows = np.flatnonzero(ellipses.node_of_row < 0)
         self._bind_inert(np.asarray(splats.means, np.float64)[inert_rows])
         axes, self.thicknesses = _rest_axes(splats, ellipses, inert_rows)
@@ -143,6 +138,35 @@ class KernelBinding:
         # Arrays of finished adaptations for the next ones: taking and giving back is atomic, so threads never share.
         self.spare_motions: list[NDArray[np.float64]] = []
         progress(1.0)
+
+    def mended(self, neighborhoods: Neighborhoods, graph: SplatGraph | None, nodes: Nodes) -> "KernelBinding":
+        """Bring it up to date after the neighbours of some nodes changed: to the bit what a new one would be.
+
+        Parameters
+        ----------
+        neighborhoods : Neighborhoods
+            After the change.
+        graph : SplatGraph or None
+            After it too.
+        nodes : (m,) int
+            Ascending; those whose neighbours may be others.
+        """
+        mended = copy(self)
+        mended.neighborhoods, mended.graph, mended.spare_motions = neighborhoods, graph, []
+        mended.__dict__.pop("published_carriers", None)
+        names = ("carriers", "weights", "stencils", "inverse_moments", "dampings")
+        for name in names:
+            setattr(mended, name, getattr(self, name).copy())
+        for lo, hi in node_runs(self.ellipses.n_nodes, nodes, _CHUNK):
+            mended._bind_nodes(lo, hi)
+        return mended
+
+    def _bind_nodes(self, lo: int, hi: int) -> None:
+        """Find what carries nodes lo to hi, and what each finds its stretch from."""
+        centers, near = self.ellipses.centers, self.neighborhoods
+        indptr, indices = (np.ascontiguousarray(each, np.int32) for each in (near.indptr, near.indices))
+        _find_carriers(lo, hi, centers, self.ellipses.semi_axes, indptr, indices, self.carriers, self.weights)
+        _find_stencils(lo, hi, centers, indptr, indices, self.stencils, self.inverse_moments, self.dampings)
 
     def _bind_inert(self, means: NDArray[np.float64]) -> None:
         """Find the nodes that carry the inert splats; without any, they stay."""

@@ -8,6 +8,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
+from splap_editor.core.compressed_rows import gathered, with_rows
 from splap_editor.core.graph.ellipse_offset import touch_scales
 from splap_editor.core.graph.ellipse_tree import ellipse_tree
 from splap_editor.core.graph.options import GRAPH_RULES, GraphOptions
@@ -142,10 +143,29 @@ def mended_graph(ellipses: Ellipses, graph: SplatGraph, options: GraphOptions) -
     """
     cut = _node_pairs(ellipses, options.cut, "cut")
     add = _node_pairs(ellipses, options.add, "add")
-    upper = np.repeat(np.arange(graph.n_nodes, dtype=np.int32), graph.degrees) < graph.indices
-    touch = None if graph.touch is None else graph.touch[upper]
-    edges, touch = _mended(ellipses, graph.edges, touch, graph.epsilon, cut, add)
-    return _symmetric(ellipses, edges, touch, graph.epsilon)
+    n, rows = graph.n_nodes, np.unique(np.concatenate([cut.ravel(), add.ravel()]))
+    _, places, owners = gathered(graph.indptr, rows)
+    keys = owners.astype(np.int64) * n + graph.indices[places]
+    # What is there already keeps its touch scale.
+    gone, come = edge_keys(cut, n), edge_keys(add, n)
+    come = np.setdiff1d(come, np.concatenate([gone, keys]))
+    kept = ~np.isin(keys, np.concatenate([gone, _turned(gone, n)]))
+    places, keys = places[kept], np.concatenate([keys[kept], come, _turned(come, n)])
+    order = np.argsort(keys)
+    owners, columns = np.divmod(keys[order], n)
+    added = np.stack(np.divmod(come, n), axis=1).astype(np.int32)
+
+    def entries(old: NDArray[np.float64], new: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.concatenate([old[places], new, new])[order]
+
+    old: list[NDArray] = [graph.indices, graph.lengths]
+    new: list[NDArray] = [columns.astype(graph.indices.dtype), entries(graph.lengths, _lengths(ellipses, added))]
+    if graph.touch is not None:
+        old.append(graph.touch)
+        new.append(entries(graph.touch, touch_scales(ellipses, added, graph.epsilon)))
+    starts = np.searchsorted(owners, np.append(rows, n))
+    indptr, arrays = with_rows(graph.indptr, tuple(old), rows, starts, tuple(new))
+    return SplatGraph(indptr, arrays[0], arrays[1], None if graph.touch is None else arrays[2], graph.epsilon)
 
 
 def require_mendable(ellipses: Ellipses, options: GraphOptions) -> None:
@@ -210,8 +230,7 @@ def _symmetric(
         shape=(n, n),
     ).tocsr()
     both.sort_indices()
-    lengths = np.linalg.norm(ellipses.centers[edges[:, 0]] - ellipses.centers[edges[:, 1]], axis=1)
-    lengths = np.maximum(lengths, _LENGTH_FLOOR * ellipses.scene_scale)
+    lengths = _lengths(ellipses, edges)
     return SplatGraph(
         indptr=both.indptr.astype(np.int32, copy=False),
         indices=both.indices.astype(np.int32, copy=False),
@@ -219,3 +238,15 @@ def _symmetric(
         touch=None if touch is None else touch[once][both.data],
         epsilon=epsilon,
     )
+
+
+def _lengths(ellipses: Ellipses, edges: NDArray[np.int32]) -> NDArray[np.float64]:
+    """(E,) distances of the ends of edges in world units, with their floor."""
+    lengths = np.linalg.norm(ellipses.centers[edges[:, 0]] - ellipses.centers[edges[:, 1]], axis=1)
+    return np.maximum(lengths, _LENGTH_FLOOR * ellipses.scene_scale)
+
+
+def _turned(keys: NDArray[np.int64], n: int) -> NDArray[np.int64]:
+    """Keys i · n + j of pairs as keys j · n + i."""
+    i, j = np.divmod(keys, n)
+    return j * n + i

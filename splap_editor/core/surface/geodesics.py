@@ -7,6 +7,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.compressed_rows import with_rows
 from splap_editor.core.graph.splat_graph import SplatGraph
 from splap_editor.core.index_spaces import Nodes
 from splap_editor.core.progress import Progress, no_progress
@@ -137,20 +138,14 @@ def mended_neighborhoods(
     nodes : (a,) int64
         Those searched again, ascending.
     """
-    is_end = np.zeros(graph.n_nodes, np.int64)
-    is_end[ends] = 1
-    totals = np.concatenate([[0], np.cumsum(is_end[before.indices])])
-    is_stale = (totals[before.indptr[1:]] > totals[before.indptr[:-1]]) | (is_end > 0)
-    nodes = np.flatnonzero(is_stale)
+    is_end = np.zeros(graph.n_nodes, bool)
+    is_end[ends] = True
+    settled_one = np.searchsorted(before.indptr, np.flatnonzero(is_end[before.indices]), side="right") - 1
+    nodes = np.union1d(settled_one, ends)
     found = geodesic_neighbors(graph, k, nodes=nodes)
-    counts = np.diff(before.indptr)
-    kept_before = np.repeat(~is_stale, counts)
-    counts[nodes] = np.diff(found.indptr)
-    kept = np.repeat(~is_stale, counts)
-    indices, distances = np.empty(len(kept), np.int32), np.empty(len(kept))
-    indices[kept], indices[~kept] = before.indices[kept_before], found.indices
-    distances[kept], distances[~kept] = before.distances[kept_before], found.distances
-    indptr = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+    indptr, (indices, distances) = with_rows(
+        before.indptr, (before.indices, before.distances), nodes, found.indptr, (found.indices, found.distances)
+    )
     return Neighborhoods(indptr, indices, distances), nodes
 
 

@@ -6,9 +6,11 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
 
+from splap_editor.core.compressed_rows import gathered, run_places, with_rows
 from splap_editor.core.graph.options import LAPLACIANS
 from splap_editor.core.graph.splat_graph import SplatGraph
 from splap_editor.core.index_spaces import Nodes
+from splap_editor.core.surface.local_triangulation import stars_of
 
 BRIDGE_WEIGHT = 0.5
 """Weight of a graph edge that stands in for triangles; about the cotangent weight 0.58 of an equilateral mesh."""
@@ -112,31 +114,86 @@ def mended_star_laplacian(
     if not len(triangles) or not len(triangles_before):
         return point_cloud_laplacian(centers, triangles, graph=graph)
     n = len(centers)
-    is_stale, touched = np.zeros(n, bool), np.zeros(n, bool)
-    is_stale[nodes] = True
+    touched = np.zeros(n, bool)
     for each in (triangles_before, triangles):
-        touched[each[is_stale[each[:, 0]]]] = True
-    starts = np.repeat(np.arange(n, dtype=np.int32), np.diff(L_before.indptr))
-    ends = L_before.indices
+        touched[each[run_places(*stars_of(each, nodes))[1]]] = True
     # A weight of just a bridge's may be one, or may come from triangles: then they say so again.
     in_doubt = np.flatnonzero(L_before.data == -BRIDGE_WEIGHT)
+    doubted = np.searchsorted(L_before.indptr, in_doubt, side="right") - 1
     # Of nodes at the floor the mass beneath it is not known.
     exact = touched | (M_before == M_before.min())
-    exact[starts[in_doubt]] = True
-    weights, masses = star_weights(centers, triangles[exact[triangles].any(axis=1)])
-    stays = (starts != ends) & ~(touched[starts] & touched[ends])
+    exact[doubted] = True
+    keys, weights, masses = _star_weights_at(centers, triangles, exact)
+    doubted_keys = doubted * n + L_before.indices[in_doubt]
+    bridges = doubted_keys[~np.isin(doubted_keys, keys[weights >= 0.5 * BRIDGE_WEIGHT])]
+    is_new = touched[keys // n] & touched[keys % n]
+    concerned = touched.copy()
+    concerned[bridges // n] = True
+    nodes = np.flatnonzero(concerned)
+    L = _with_weights(L_before, nodes, touched, bridges, keys[is_new], weights[is_new])
+    # The weights are symmetric: of either way of counting parts this is the one that turns no matrix over.
+    n_parts, parts = connected_components(L, connection="strong")
+    edges = _bridge_edges(n_parts, parts, graph)
+    if len(edges):
+        keys = np.concatenate([edges @ np.array([n, 1]), edges @ np.array([1, n])])
+        held = np.full(len(keys), BRIDGE_WEIGHT)
+        L = _with_weights(L, np.unique(edges), np.zeros(n, bool), np.zeros(0, np.int64), keys, held)
+    return L, _floored(np.where(exact, masses, M_before), graph)
+
+
+def _star_weights_at(
+    centers: NDArray[np.float64], triangles: NDArray[np.integer], asked: NDArray[np.bool_]
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Keys i · n + j and positive weights of the edges at some nodes and of others, and (n,) masses of these nodes."""
+    n = len(centers)
+    at_one = asked[triangles[:, 0]] | asked[triangles[:, 1]] | asked[triangles[:, 2]]
+    used, corners = np.unique(triangles[at_one], return_inverse=True)
+    weights, local_masses = star_weights(centers[used], corners.reshape(-1, 3))
     found = weights.tocoo()
-    keys = [row.astype(np.int64) * n + column for row, column in ((starts, ends), (found.row, found.col))]
-    is_bridge = ~np.isin(keys[0][in_doubt], keys[1][found.data >= 0.5 * BRIDGE_WEIGHT])
-    stays[in_doubt[is_bridge]] = False
-    is_new = touched[found.row] & touched[found.col]
-    values = np.concatenate([-L_before.data[stays], found.data[is_new]])
-    rows = np.concatenate([starts[stays], found.row[is_new]])
-    columns = np.concatenate([ends[stays], found.col[is_new]])
-    weights = sp.coo_array((values, (rows, columns)), shape=(n, n)).tocsr()
-    weights.sort_indices()
-    weights = weights + _bridges(weights, graph)
-    return _laplacian_of(weights), _floored(np.where(exact, masses, M_before), graph)
+    positive = found.data > 0.0
+    masses = np.zeros(n)
+    masses[used] = local_masses
+    return used[found.row[positive]].astype(np.int64) * n + used[found.col[positive]], found.data[positive], masses
+
+
+def _with_weights(
+    L: sp.csr_array,
+    nodes: Nodes,
+    inner: NDArray[np.bool_],
+    gone: NDArray[np.int64],
+    keys: NDArray[np.int64],
+    weights: NDArray[np.float64],
+) -> sp.csr_array:
+    """Put weights into a Laplacian, and sum those rows again.
+
+    Parameters
+    ----------
+    L : (n, n) csr_array
+    nodes : (m,) int
+        Rows concerned, ascending.
+    inner : (n,) bool
+        Nodes between which no weight stays as it was.
+    gone : (g,) int64
+        Keys i · n + j of other weights that do not.
+    keys, weights : (w,) int64, float64
+        What comes; all of it in these rows.
+    """
+    n = L.shape[0]
+    _, places, owners = gathered(L.indptr, nodes)
+    columns = L.indices[places]
+    were = owners.astype(np.int64) * n + columns
+    stays = (owners != columns) & ~(inner[owners] & inner[columns]) & ~np.isin(were, gone)
+    keys = np.concatenate([were[stays], keys])
+    order = np.argsort(keys)
+    keys, weights = keys[order], np.concatenate([-L.data[places[stays]], weights])[order]
+    sums = np.bincount(np.searchsorted(nodes, keys // n), weights, len(nodes))
+    keys, values = np.concatenate([keys, nodes * (n + 1)]), np.concatenate([-weights, sums])
+    order = np.argsort(keys)
+    keys = keys[order]
+    starts = np.searchsorted(keys, np.append(nodes, n) * n)
+    new = (keys % n).astype(np.int32), values[order]
+    indptr, (indices, data) = with_rows(L.indptr, (L.indices, L.data), nodes, starts, new)
+    return sp.csr_array((data, indices, indptr), shape=(n, n))
 
 
 def star_weights(
@@ -185,9 +242,17 @@ def _bridges(weights: sp.csr_array, graph: SplatGraph) -> sp.csr_array:
     n = graph.n_nodes
     weights.eliminate_zeros()
     n_parts, parts = connected_components(weights, directed=False)
-    between = parts[graph.edges[:, 0]] != parts[graph.edges[:, 1]]
-    edges = graph.edges[between]
-    lengths = graph.lengths[np.repeat(np.arange(n), graph.degrees) < graph.indices][between]
+    chosen = _bridge_edges(n_parts, parts, graph)
+    bridges = sp.csr_array((np.full(len(chosen), BRIDGE_WEIGHT), (chosen[:, 0], chosen[:, 1])), shape=(n, n))
+    return bridges + bridges.T
+
+
+def _bridge_edges(n_parts: int, parts: NDArray[np.int32], graph: SplatGraph) -> NDArray[np.int32]:
+    """(B, 2) shortest graph edges i < j that join parts, as far as edges do; parts (n,) are numbered from 0."""
+    starts = np.repeat(np.arange(graph.n_nodes, dtype=np.int32), graph.degrees if n_parts > 1 else 0)
+    ends = graph.indices[: len(starts)]
+    between = np.flatnonzero((parts[starts] != parts[ends]) & (starts < ends))
+    edges, lengths = np.stack([starts[between], ends[between]], axis=1), graph.lengths[between]
     # One candidate per two parts: the shortest, of equal ones that of the lowest nodes.
     pairs = np.sort(parts[edges], axis=1)
     order = np.lexsort((edges[:, 1], edges[:, 0], lengths, pairs[:, 1], pairs[:, 0]))
@@ -197,9 +262,7 @@ def _bridges(weights: sp.csr_array, graph: SplatGraph) -> sp.csr_array:
     # Ranks for weights: distinct, so that the forest is, and not zero, which would be no edge.
     ranks[np.lexsort((edges[best, 1], edges[best, 0], lengths[best]))] = np.arange(1, len(best) + 1)
     forest = minimum_spanning_tree(sp.csr_array((ranks, (pairs[best, 0], pairs[best, 1])), shape=(n_parts, n_parts)))
-    chosen = edges[best][np.isin(ranks, forest.data)]
-    bridges = sp.csr_array((np.full(len(chosen), BRIDGE_WEIGHT), (chosen[:, 0], chosen[:, 1])), shape=(n, n))
-    return bridges + bridges.T
+    return edges[best][np.isin(ranks, forest.data)]
 
 
 def _laplacian_of(weights: sp.csr_array) -> sp.csr_array:

@@ -4,6 +4,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.compressed_rows import with_runs
 from splap_editor.core.index_spaces import Nodes
 from splap_editor.core.progress import Progress, no_progress
 from splap_editor.core.splats.occupancy import Ellipses
@@ -81,11 +82,16 @@ def mended_triangulations(
     nodes : (m,) int
         Ascending; those whose neighbours have changed.
     """
-    is_stale = np.zeros(ellipses.n_nodes, bool)
-    is_stale[nodes] = True
     found = local_triangulations(ellipses, neighborhoods, nodes=nodes)
-    triangles = np.concatenate([before[~is_stale[before[:, 0]]], found])
-    return triangles[np.argsort(triangles[:, 0], kind="stable")]
+    firsts, ends = stars_of(before, nodes)
+    return with_runs(before, firsts, ends, found, np.append(stars_of(found, nodes)[0], len(found)))
+
+
+def stars_of(triangles: NDArray[np.integer], nodes: Nodes) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """(m,) first triangle and last + 1 of the stars of some nodes, among all stars."""
+    centers = np.ascontiguousarray(triangles[:, 0])
+    asked = nodes.astype(centers.dtype)
+    return np.searchsorted(centers, asked), np.searchsorted(centers, asked, side="right")
 
 
 @nb.njit(nogil=True, cache=True)

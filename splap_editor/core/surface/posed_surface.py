@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from splap_editor.core.compressed_rows import gathered
 from splap_editor.core.index_spaces import NodeMask, Nodes
 from splap_editor.core.splats.occupancy import Ellipses
 from splap_editor.core.surface.geodesics import Neighborhoods
@@ -156,9 +157,7 @@ def pairs_beside(ellipses: Ellipses) -> Beside:
 def near_rows(neighborhoods: Neighborhoods, nodes: Nodes) -> sp.csr_array:
     """(k, n) which nodes are nearest along the surface to each of some nodes, as ones."""
     n = neighborhoods.n_nodes
-    starts, counts = neighborhoods.indptr[nodes], np.diff(neighborhoods.indptr)[nodes]
-    indptr = np.concatenate([[0], np.cumsum(counts)])
-    places = np.arange(indptr[-1]) + np.repeat(starts - indptr[:-1], counts)
+    indptr, places, _ = gathered(neighborhoods.indptr, nodes)
     return sp.csr_array((np.ones(len(places)), neighborhoods.indices[places], indptr), shape=(len(nodes), n))
 
 

@@ -8,6 +8,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 
+from splap_editor.core.compressed_rows import gathered
 from splap_editor.core.graph.splat_graph import SplatGraph
 from splap_editor.core.surface.geodesics import geodesic_distances
 
@@ -25,6 +26,9 @@ NEARLY = 0.8
 
 _MOST_SEAMS = 24
 """Longer and longer ways are cut so many times at most."""
+
+_FIRST_EDGES = 16.0
+"""A first look goes so many mean edges far."""
 
 _UNIT = 1000.0
 """Capacities are whole numbers: this much is the strongest contact at the longest way's end."""
@@ -119,22 +123,36 @@ def seam_between(graph: SplatGraph, first: NDArray[np.integer], second: NDArray[
 
 
 class _Ways:
-    """The ways between two parts of a graph."""
+    """The ways between two parts of a graph, looked at as far as they lead."""
 
     def __init__(self, graph: SplatGraph, first: NDArray[np.integer], second: NDArray[np.integer]) -> None:
         self.graph, self.first, self.second = graph, first, second
-        starts = np.repeat(np.arange(graph.n_nodes, dtype=np.int32), graph.degrees)
-        self.entries = np.flatnonzero(starts < graph.indices)
-        self.starts = starts
+        self.lengths = graph.lengths.copy()
+        self.open = replace(graph, lengths=self.lengths)
 
-    def left(self, cut: NDArray[np.integer]) -> float:
-        """Length of the shortest way without some entries of the graph's arrays; inf if there is none."""
-        lengths = self.graph.lengths
-        if len(cut):
-            lengths = lengths.copy()
-            lengths[cut] = np.inf
-        graph = replace(self.graph, lengths=lengths)
-        return float(geodesic_distances(graph, self.first)[self.second].min())
+    def left(self, cut: NDArray[np.integer], radius: float | None = None) -> float:
+        """Length of the shortest way without some entries of the graph's arrays; inf if there is none.
+
+        Both parts are looked about in twice as far a ball, beginning with a radius, until the two balls hold a way or
+        one of them can not grow: a small part that is off is all that is searched.
+        """
+        if not len(self.lengths):
+            return np.inf
+        self.lengths[cut] = np.inf
+        radius = radius or _FIRST_EDGES * float(self.graph.lengths.mean())
+        while True:
+            apart = [geodesic_distances(self.open, part, limit=radius) for part in (self.first, self.second)]
+            few, many = sorted(apart, key=lambda each: np.count_nonzero(each < np.inf))
+            _, places, tails = gathered(self.graph.indptr, np.flatnonzero(few < np.inf))
+            heads, lengths = self.graph.indices[places], self.lengths[places]
+            shortest = float((few[tails] + lengths + many[heads]).min(initial=np.inf))
+            # A way of two radii has an edge with one end in either ball.
+            is_whole = not ((few[heads] == np.inf) & (lengths < np.inf)).any()
+            if shortest <= 2.0 * radius or is_whole:
+                break
+            radius *= 2.0
+        self.lengths[cut] = self.graph.lengths[cut]
+        return shortest
 
     def cut_up_to(self, longest: float) -> Seam:
         """Minimum cut of all ways that are at most so long, in world units."""
@@ -143,9 +161,10 @@ class _Ways:
         nodes = np.flatnonzero(apart[0] + apart[1] <= longest)
         number = np.full(graph.n_nodes, -1, np.int32)
         number[nodes] = np.arange(len(nodes), dtype=np.int32)
-        tails, heads = self.starts[self.entries], graph.indices[self.entries]
-        within = (number[tails] >= 0) & (number[heads] >= 0)
-        entries, tails, heads = self.entries[within], tails[within], heads[within]
+        _, entries, tails = gathered(graph.indptr, nodes.astype(np.int32))
+        heads = graph.indices[entries]
+        within = (tails < heads) & (number[heads] >= 0)
+        entries, tails, heads = entries[within], tails[within], heads[within]
         touch = 0.0 if graph.touch is None else graph.touch[entries]
         near = np.minimum(apart[0], apart[1])
         radius = np.maximum(np.maximum(near[tails], near[heads]), graph.lengths[entries])
@@ -161,7 +180,7 @@ class _Ways:
             graph.indptr[j] + np.searchsorted(graph.indices[graph.indptr[j] : graph.indptr[j + 1]], i) for i, j in edges
         ]
         cut = np.concatenate([entries[crossing], np.array(twins, np.int64)])
-        return Seam(edges, longest, self.left(cut))
+        return Seam(edges, longest, self.left(cut, longest))
 
 
 def _first_side(
