@@ -20,6 +20,7 @@ from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.splats.rotations import matrices_to_quats, quat_products, quats_to_matrices
 from splap_editor.core.splats.splats import Splats
 from splap_editor.io.formats.bare_splats import FAINT, OPAQUE, alphas_of, as_bytes, row_blocks
+from splap_editor.io.formats.node_placement import is_in_bounds, turn_and_factor
 from splap_editor.io.formats.source import LARGEST_FILE, Source
 from splap_editor.io.formats.splat32 import log_scales_of
 from splap_editor.io.json_object import parsed_json
@@ -46,7 +47,6 @@ _MOST_ATTRIBUTES = 20
 """Four, and a coefficient of the harmonics each."""
 
 _BLOCK_BYTES = 1 << 22
-_EVEN = 1e-4
 
 
 @dataclass(frozen=True)
@@ -227,6 +227,8 @@ def _clouds(document: _Document, progress: Progress) -> Iterator[_Cloud]:
         number, parent = todo.pop()
         node = document.item("nodes", number)
         world = parent @ _local(document, node)
+        if not is_in_bounds(world):
+            raise document.source.damaged("its nodes put things farther away than anything is read from")
         children = node.get("children", [])
         add(children if isinstance(children, list) else [], world)
         if "mesh" in node:
@@ -295,7 +297,12 @@ def _fill(sheet: Splats, rows: slice, document: _Document, cloud: _Cloud, progre
 
     half_turn = np.diag([-1.0, -1.0, 1.0, 1.0])
     world = half_turn @ cloud.world
-    turn, factor = _turn_and_factor(document, world)
+    placed = turn_and_factor(world)
+    if placed is None:
+        raise document.source.refused(
+            "has a node that mirrors or stretches its splats", "Apply its scale, then export."
+        )
+    turn, factor = placed
     means, quats = numbers("POSITION", 3), numbers(f"{EXTENSION}:ROTATION", 4)[:, [3, 0, 1, 2]]
     n_coefficients = sheet.shN.shape[1]
     shN = np.zeros((cloud.n_splats, n_coefficients, 3), np.float32)
@@ -336,18 +343,6 @@ def _moved(
 
             shN = rotated_sh(shN, np.broadcast_to(turn, (len(shN), 3, 3)))
         return means.astype(np.float32), quats.astype(np.float32), shN
-
-
-def _turn_and_factor(document: _Document, world: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-    """Rotation and even scale of a node; splats cannot be scaled unevenly."""
-    determinant = float(np.linalg.det(world[:3, :3]))
-    factor = float(np.cbrt(determinant))
-    turn = world[:3, :3] / factor if factor > 0 else world[:3, :3]
-    if not factor > 0 or np.abs(turn @ turn.T - np.eye(3)).max() > _EVEN:
-        raise document.source.refused(
-            "has a node that mirrors or stretches its splats", "Apply its scale, then export."
-        )
-    return turn, factor
 
 
 def write(out: BinaryIO, splats: Splats, progress: Progress) -> None:

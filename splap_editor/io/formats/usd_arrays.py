@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from splap_editor.core.splats.rotations import matrices_to_quats, quat_products
+from splap_editor.io.formats.node_placement import turn_and_factor
 from splap_editor.io.ply_reader import available_memory
-
-_EVEN = 1e-4
 
 _BYTES, _TIMES = 3 << 29, 32
 """Address space for a stage of any size, most of it never used, and more for each byte."""
@@ -137,11 +136,10 @@ def _arrays(prim: Any, time: Any, world: np.ndarray) -> dict[str, np.ndarray] | 
     if colors is None or len(colors) < n * n_coefficients:
         colors, n_coefficients = np.zeros((n, 3), np.float32), 1
     harmonics = colors[: n * n_coefficients].reshape(n, n_coefficients, 3)
-    determinant = float(np.linalg.det(world[:3, :3]))
-    factor = float(np.cbrt(determinant))
-    turn = world[:3, :3] / factor if factor > 0 else world[:3, :3]
-    if not factor > 0 or np.abs(turn @ turn.T - np.eye(3)).max() > _EVEN:
-        return "has a prim that mirrors or stretches its splats"
+    placed = turn_and_factor(world)
+    if placed is None:
+        return "has a prim that mirrors or stretches its splats, or puts them beyond any place"
+    turn, factor = placed
     if np.abs(world - np.eye(4)).max() > 1e-12:
         means = (means.astype(np.float64) @ world[:3, :3].T + world[:3, 3]).astype(np.float32)
         arrays["scales"] = arrays["scales"] * np.float32(factor)

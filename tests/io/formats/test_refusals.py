@@ -144,6 +144,12 @@ def test_a_sog_in_a_folder_that_is_too_large_or_no_file_is_not_read(tmp_path, sc
         read_splats(folder)
 
 
+def towers(node: dict) -> list[dict]:
+    """Nodes within nodes, the last of them the one given, each as large as one may be."""
+    huge = [{"scale": [9e14] * 3, "children": [k + 1]} for k in range(40)]
+    return [*huge, node]
+
+
 def test_a_gltf_follows_no_link_out_of_its_folder(tmp_path, scene):
     write_splats(tmp_path / "out.glb", scene, scene.splats)
     packed = (tmp_path / "out.glb").read_bytes()
@@ -165,6 +171,8 @@ def test_a_gltf_follows_no_link_out_of_its_folder(tmp_path, scene):
         (lambda held: held["accessors"][0].update(componentType=[5126]), "componentType is"),
         (lambda held: held["accessors"][0].update(componentType=5124), "wrong type"),
         (lambda held: held.update(scenes=None, nodes=5), "holds no Gaussian splats"),
+        (lambda held: held["nodes"].__setitem__(slice(None), towers(held["nodes"][0])), "farther away than anything"),
+        (lambda held: held["nodes"][0].update(scale=[1, 1, 2]), "mirrors or stretches"),
     ],
 )
 def test_a_gltf_whose_json_is_of_other_types_is_refused(tmp_path, scene, change, words):
