@@ -228,13 +228,15 @@ def _proxy(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     meshes.add_mesh(pymeshlab.Mesh(scene.ellipses.centers[opaque], v_normals_matrix=scene.ellipses.normals[opaque]))
     # A splat's normal has no sign: the library finds one by going from neighbour to neighbour.
     meshes.compute_normal_for_point_clouds(k=16)
-    meshes.generate_surface_reconstruction_screened_poisson(depth=9, preclean=True)
+    tree = cKDTree(scene.ellipses.centers[opaque])
+    spacing = np.median(tree.query(scene.ellipses.centers[opaque], 2)[0][:, 1])
+    # Cells of half a spacing: finer ones cost much and have nothing to show. Threads wait for each other by turning.
+    depth = int(np.clip(np.ceil(np.log2(2.0 * scene.truth.size / spacing)), 6, 9))
+    meshes.generate_surface_reconstruction_screened_poisson(depth=depth, preclean=True, threads=1)
     meshes.meshing_remove_unreferenced_vertices()
     mesh = meshes.current_mesh()
     vertices, faces = np.array(mesh.vertex_matrix()), np.array(mesh.face_matrix(), np.int64)
     # What Poisson closes far away from any splat is no surface of the object.
-    tree = cKDTree(scene.ellipses.centers[opaque])
-    spacing = np.median(tree.query(scene.ellipses.centers[opaque], 2)[0][:, 1])
     near = tree.query(vertices)[0] <= 6.0 * spacing
     faces = faces[near[faces].all(axis=1)]
     if not len(faces):

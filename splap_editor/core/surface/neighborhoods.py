@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from splap_editor.core.graph.splat_graph import SplatGraph
-from splap_editor.core.index_spaces import Node
+from splap_editor.core.index_spaces import Node, Nodes
 from splap_editor.core.progress import Progress
 from splap_editor.core.splats.occupancy import Ellipses
 from splap_editor.core.surface.geodesics import Neighborhoods, geodesic_neighbors
@@ -14,6 +14,9 @@ NORMAL_SHARE = 0.1
 """Standard deviation across the surface in units of the smaller one within it, for Mahalanobis distances."""
 
 _CHUNK = 4096
+
+_GUESSED = 8
+"""So many times k of the nearest in space hold, for most nodes, all that a stretched measure can bring near."""
 
 
 def nearest_along_surface(ellipses: Ellipses, graph: SplatGraph, k: int, progress: Progress) -> Neighborhoods:
@@ -71,18 +74,22 @@ def nearest_by_mahalanobis(ellipses: Ellipses, graph: SplatGraph, k: int, progre
     wanted = min(k, n - 1)
     tree = cKDTree(ellipses.centers)
     near, far = np.empty((n, wanted), np.int64), np.empty((n, wanted))
-    for i in range(n if wanted else 0):
-        if i % _CHUNK == 0:
-            progress(i / n)
-        # Whoever is farther than the k-th of a first guess times the longest axis is farther by this measure as well.
-        guess = np.atleast_1d(tree.query(ellipses.centers[i], wanted + 1)[1])
-        reach = np.partition(_mahalanobis(ellipses, i, guess), wanted)[wanted] * ellipses.reaches[i]
-        found = np.array(tree.query_ball_point(ellipses.centers[i], reach * (1.0 + 1e-9)))
-        found = np.union1d(found, guess)
-        found = found[found != i]
-        distances = _mahalanobis(ellipses, i, found)
-        best = np.lexsort((found, distances))[:wanted]
-        near[i], far[i] = found[best], distances[best]
+    for start in range(0, n if wanted else 0, _CHUNK):
+        progress(start / n)
+        nodes = np.arange(start, min(start + _CHUNK, n))
+        lengths, guesses = tree.query(ellipses.centers[nodes], min(_GUESSED * wanted, n - 1) + 1)
+        distances = _mahalanobis(ellipses, nodes, guesses)
+        distances[guesses == nodes[:, None]] = np.inf
+        # Whoever is farther than the k-th of the guess times the longest axis is farther by this measure as well.
+        reaches = np.partition(distances, wanted - 1, axis=1)[:, wanted - 1] * ellipses.reaches[nodes] * (1.0 + 1e-9)
+        best = np.lexsort((guesses, distances), axis=1)[:, :wanted]
+        near[nodes], far[nodes] = np.take_along_axis(guesses, best, 1), np.take_along_axis(distances, best, 1)
+        for i, reach in zip(nodes[reaches > lengths[:, -1]], reaches[reaches > lengths[:, -1]], strict=True):
+            found = np.array(tree.query_ball_point(ellipses.centers[i], reach))
+            found = found[found != i]
+            apart = _mahalanobis(ellipses, np.array([i]), found[None])[0]
+            best = np.lexsort((found, apart))[:wanted]
+            near[i], far[i] = found[best], apart[best]
     return _in_rows(near, far, n)
 
 
@@ -93,9 +100,14 @@ def mahalanobis_frame(ellipses: Ellipses, node: Node) -> NDArray[np.float64]:
     return np.stack([major / (major @ major), minor / length**2, ellipses.normals[node] / (NORMAL_SHARE * length)])
 
 
-def _mahalanobis(ellipses: Ellipses, node: Node, others: NDArray[np.int64]) -> NDArray[np.float64]:
-    steps = (ellipses.centers[others] - ellipses.centers[node]) @ mahalanobis_frame(ellipses, node).T
-    return np.linalg.norm(steps, axis=1)
+def _mahalanobis(ellipses: Ellipses, nodes: Nodes, others: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(m, c) distances of (m, c) other nodes from (m,) nodes, each by its own ellipse."""
+    major, minor = ellipses.semi_axes[nodes, 0], ellipses.semi_axes[nodes, 1]
+    lengths = np.linalg.norm(minor, axis=1)[:, None]
+    axes = (major / np.square(major).sum(1)[:, None], minor / lengths**2)
+    frames = np.stack([*axes, ellipses.normals[nodes] / (NORMAL_SHARE * lengths)], axis=1)
+    steps = ellipses.centers[others] - ellipses.centers[nodes, None]
+    return np.linalg.norm(steps @ frames.swapaxes(1, 2), axis=2)
 
 
 def _in_rows(near: NDArray[np.int64], far: NDArray[np.float64], n: int) -> Neighborhoods:
