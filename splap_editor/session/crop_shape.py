@@ -130,11 +130,14 @@ def shape_about(
     axes: NDArray[np.float64] | None = None,
     points: NDArray[np.floating] | None = None,
 ) -> CropShape:
-    """A shape with a little room about the main subject; a plane through its middle, across the third axis.
+    """A shape with a little room about the main subject and what is seen beside it; a plane through their middle.
+
+    The plane lies across the third axis.
 
     Its sides go along the rows of a rotation ``axes`` (3, 3), by default the axes of the file. Along others the
     subject's ``points`` (n, 3) say more than the corners of its box do.
     """
+    subject = subject.seen or subject
     axes = np.eye(3) if axes is None else axes
     around = subject.corners if points is None or not len(points) else points
     extent = np.abs((around - subject.center) @ axes.T).max(axis=0)

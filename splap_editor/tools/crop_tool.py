@@ -154,7 +154,7 @@ class CropTool(Tool):
         return Claim(frame, frozenset(acts))
 
     def begin(self) -> None:
-        """Show a shape about the subject."""
+        """Show a shape about the subject and the sparser parts beside it."""
         self._is_dismissed = False
         scene = self.context.session.shown_scene
         axes, kind = scene.edit.place.rotation, CropKind(self._options.value.kind)
@@ -251,14 +251,13 @@ class CropTool(Tool):
         shape, viewport = self.shape, self.context.viewport
         if shape is None:
             return None
-        tips = self._stubs(shape)[:, 1]
-        places = np.concatenate([tips, shape.handles])
-        distances = np.linalg.norm(viewport.projection.pixels(places) - np.array(xy), axis=1)
-        distances = np.nan_to_num(distances, nan=np.inf)
+        feet, tips = (viewport.projection.pixels(places) for places in self._stubs(shape).swapaxes(0, 1))
+        # Anywhere along a stub, not at its ends alone.
+        along, way = tips - feet, np.array(xy) - feet
+        shares = np.clip((way * along).sum(axis=1) / np.maximum((along * along).sum(axis=1), 1e-12), 0.0, 1.0)
+        distances = np.nan_to_num(np.linalg.norm(way - shares[:, None] * along, axis=1), nan=np.inf)
         nearest = int(np.argmin(distances))
-        if distances[nearest] > GRAB_PX * viewport.gizmo.scale:
-            return None
-        return nearest % len(tips)
+        return nearest if distances[nearest] <= GRAB_PX * viewport.gizmo.scale else None
 
     # Options ------------------------------------------------------------------------------------------------------
 

@@ -42,7 +42,7 @@ class FloaterOptions:
 class FloatersTool(Tool):
     """Looks for floaters once it is taken up; the strength changes what is tinted at once.
 
-    `changed` tells of other groups, of others that stay, and of another one that is looked at.
+    `changed` tells of other groups, of others that stay, of another one that is looked at, and how far the search is.
     """
 
     name = "floaters"
@@ -55,12 +55,13 @@ class FloatersTool(Tool):
         self.changed = Signal()
         self.preview = FloaterPreview(context.session)
         self.looked_at: int | None = None
+        self.doing = ""
         self._is_in_use = self._is_dismissed = False
         self._strength = context.held(FloaterOptions)
         self._strength.changed.connect(self._on_strength)
         self.preview.changed.connect(self._show)
         self.preview.told.connect(self._tell)
-        self.preview.failed.connect(lambda error: self.context.hud.show(text=str(error)))
+        self.preview.failed.connect(lambda error: self._say(str(error)))
 
     @property
     def found(self) -> FoundFloaters | None:
@@ -76,8 +77,8 @@ class FloatersTool(Tool):
         """Look for floaters among what is left."""
         self._is_in_use, self._is_dismissed = True, False
         if not self.preview.is_shown:
-            self.context.hud.show(text="Looking for floaters …")
             self.preview.show(self._strength.value.strength)
+            self._say("Looking for floaters …")
 
     def cancel(self) -> None:
         """Show no floaters."""
@@ -149,7 +150,13 @@ class FloatersTool(Tool):
     def _tell(self, stage: str, share: float) -> None:
         words = {"contributions": "seeing which splats make the picture", "occupancy": "measuring splats"}
         told = words.get(stage, "weighing what is known of each")
-        self.context.hud.show(text=f"Looking for floaters – {told}, {share:.0%}")
+        self._say(f"Looking for floaters – {told}, {share:.0%}")
+
+    def _say(self, doing: str) -> None:
+        """Say what is awaited, in the picture and to who listens."""
+        self.doing = doing
+        self.context.hud.show(text=doing)
+        self.changed.emit()
 
     def _show(self) -> None:
         found = self.found

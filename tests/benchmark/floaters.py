@@ -4,6 +4,7 @@
 
     python -m tests.benchmark.floaters                       # objects, kinds and seeds that nothing was fitted on
     python -m tests.benchmark.floaters --captures FOLDER     # the captures of a folder among them, and as they are
+    python -m tests.benchmark.floaters --many                # by pictures as of more than 200,000 splats
     python -m tests.benchmark.floaters --fit                 # print the numbers of core/splats/floater_weights.py
 """
 
@@ -17,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from splap_editor.core.splats import contributions
 from splap_editor.core.splats.floater_evidence import EVIDENCE, floater_evidence
 from splap_editor.core.splats.floaters import Floaters, floaters
 from splap_editor.core.splats.main_subject import main_subject
@@ -160,7 +162,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--fit", action="store_true", help="fit the model on the objects for it")
     parser.add_argument("--captures", type=Path, metavar="FOLDER", help="captures to find floaters in as they are")
+    parser.add_argument("--many", action="store_true", help="look at each scene as at one of very many splats")
     options = parser.parse_args()
+    if options.many:
+        contributions.MANY = 0
     if options.fit:
         scenes = []
         for _, _, splats, is_floater in made_scenes(FITTED, None):

@@ -1,5 +1,7 @@
 """Crop shapes: what a drag of a handle keeps where it is, and that the step picks what the shape holds."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -59,3 +61,11 @@ def test_a_shape_begins_about_the_whole_subject(kind):
     if kind is not CropKind.PLANE:
         assert picked_splats(shape.picked, subject.corners).all()
     assert all(loop.shape[1] == 3 for loop in shape.loops)
+
+
+@pytest.mark.parametrize("kind", [CropKind.BOX, CropKind.BALL])
+def test_a_shape_begins_about_sparser_parts_too(kind):
+    subject = main_subject(POINTS, np.ones(len(POINTS)))
+    seen = replace(subject, center=subject.center + 0.4 * subject.size, half_axes=1.7 * subject.half_axes)
+    shape = shape_about(replace(subject, seen=seen), kind)
+    assert picked_splats(shape.picked, seen.corners).all()

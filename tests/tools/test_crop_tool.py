@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from splap_editor.core.removal import PickedBall, PickedBox, picked_splats
-from splap_editor.tools.crop_tool import CropNumbers, CropOptions
+from splap_editor.tools.crop_tool import GRAB_PX, CropNumbers, CropOptions
 
 
 def shown(hand, kind="box"):
@@ -47,6 +47,21 @@ def test_a_face_follows_the_pointer_and_return_crops_in_one_step(hand):
     assert tool.shape is None and not hand.context.hud.text
     hand.session.history.undo()
     assert hand.scene.edit.removed is None
+
+
+def test_a_handle_is_taken_anywhere_along_it(hand):
+    tool = shown(hand)
+    handle = widest(hand, tool)
+    large = tool.shape.sized(tool.shape.center, 8.0 * tool.shape.halves)
+    foot = large.handles[handle]
+    tip = foot + 0.12 * large.halves.mean() * large.normals[handle]
+    foot, tip = hand.viewport.projection.pixels(np.stack([foot, tip]))
+    assert np.linalg.norm(tip - foot) > 3.0 * GRAB_PX
+    for share in (0.0, 0.25, 0.5, 0.75, 1.0):
+        tool.show(large)
+        start = foot + share * (tip - foot)
+        hand.drag(start, start + 20.0, start + 40.0)
+        assert (tool.shape.handles[handle] != large.handles[handle]).any(), share
 
 
 def test_what_goes_is_tinted_and_escape_takes_shape_and_tint_away(hand):

@@ -1,11 +1,14 @@
 """Floaters in the window: groups in a list, looked at, kept, removed."""
 
+import threading
+
 import numpy as np
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QStyle, QStyleOptionViewItem
 
 from splap_editor.core.removal import PickedFloaters
+from splap_editor.session.floater_search import floater_search
 from splap_editor.tools.floaters_tool import FloaterOptions
 from tests.ui.conftest import WAIT_MS
 
@@ -43,6 +46,24 @@ def test_the_panel_is_there_with_its_tool_and_lists_the_groups(driver):
     assert f"{len(found.rows):,} splats float" in panel.status.text()
     driver.key(Qt.Key.Key_W)
     assert not panel.isVisible() and panel.model.rowCount() == 0
+
+
+def test_the_panel_says_what_it_does_while_it_looks(driver, monkeypatch):
+    go_on, panel, tool = threading.Event(), driver.window.floaters_panel, driver.window.tools.tools["floaters"]
+
+    def awaited(splats, removal, ellipses, *, stages, run):
+        stages("contributions")(0.25)
+        go_on.wait(60.0)
+        return floater_search(splats, removal, ellipses)
+
+    monkeypatch.setattr("splap_editor.session.floater_preview.floater_search", awaited)
+    driver.key(Qt.Key.Key_F, Qt.KeyboardModifier.ShiftModifier)
+    assert panel.status.text() == "Looking for floaters …"
+    driver.qtbot.waitUntil(lambda: panel.status.text().endswith("seeing which splats make the picture, 25%"))
+    assert not panel.take.isEnabled()
+    go_on.set()
+    driver.qtbot.waitUntil(lambda: tool.found is not None, timeout=WAIT_MS)
+    assert "float" in panel.status.text() and "Looking" not in panel.status.text()
 
 
 def test_a_row_frames_its_group_and_its_tick_keeps_it(driver):

@@ -3,6 +3,12 @@
 import numpy as np
 from PySide6.QtCore import Qt
 
+from splap_editor.cli import main
+from splap_editor.core.removal import PickedBox, PickedFloaters, RemovalStep
+from splap_editor.engine.removal import removal_of
+from splap_editor.session.edit_file import write_edit
+from tests.ui.conftest import WAIT_MS
+
 
 def selected(driver, n=300):
     mask = np.zeros(driver.scene.splats.n_splats, bool)
@@ -52,3 +58,22 @@ def test_keep_only_selected_and_restore_all(driver, qtbot):
     assert driver.scene.edit.removed is None
     driver.wait_idle()
     assert not actions["remove.restore_all"].isEnabled()
+
+
+def test_window_recipe_and_clean_write_the_same(driver, qtbot, tmp_path):
+    """Crop to a box, then take the floaters of what is left."""
+    source, splats = driver.scene.file.path, driver.scene.splats
+    low, high = np.quantile(np.asarray(splats.means, np.float64), [0.1, 1.0], axis=0)
+    box = PickedBox(tuple((0.5 * (low + high)).tolist()), tuple((high - low).tolist()))
+    removal = removal_of((RemovalStep(box, outside=True), RemovalStep(PickedFloaters(0.9))), splats)
+    driver.session.steps.change_removal(removal, "Clean")
+    recipe, by_window, by_recipe, by_clean = (tmp_path / name for name in ("e.json", "w.ply", "r.ply", "c.ply"))
+    write_edit(recipe, driver.scene)
+    driver.session.export(by_window)
+    qtbot.waitUntil(lambda: by_window.exists() and not driver.session.is_busy("export"), timeout=WAIT_MS)
+    assert main(["deform", str(source), "--recipe", str(recipe), "-o", str(by_recipe), "--quiet"]) == 0
+    crop = [str(value) for value in (*low, *high)]
+    assert main(["clean", str(source), "-o", str(by_clean), "--crop", *crop, "--strength", "0.9", "--quiet"]) == 0
+    assert by_window.read_bytes() == by_recipe.read_bytes() == by_clean.read_bytes()
+    assert 0 < removal.n_removed < splats.n_splats
+    driver.wait_idle()

@@ -1,11 +1,13 @@
 """What is known of each splat that may float: its neighbours, what hangs together with it, and what it shows."""
 
+from functools import partial
+
 import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from splap_editor.core.progress import Runner, StageProgress, in_turn, part_of, silent
+from splap_editor.core.progress import Progress, Runner, StageProgress, in_turn, part_of, silent
 from splap_editor.core.splats.contributions import Contributions, contributions
 from splap_editor.core.splats.main_subject import MainSubject
 from splap_editor.core.splats.occupancy import Ellipses
@@ -92,7 +94,7 @@ def floater_evidence(
     subject = _whole_subject(ellipses, pieces[-1])
     shown = contributions(splats, ellipses, subject=subject, progress=stages("contributions"), run=run)
     progress(0.8)
-    return _columns(ellipses, around, pieces, subject, shown), around.wide
+    return _columns(ellipses, around, pieces, subject, shown, part_of(progress, 0.8, 0.9), run), around.wide
 
 
 def _whole_subject(ellipses: Ellipses, labels: NDArray[np.int32]) -> MainSubject:
@@ -115,14 +117,16 @@ def _columns(
     pieces: list[NDArray[np.int32]],
     subject: MainSubject,
     shown: Contributions,
+    progress: Progress,
+    run: Runner,
 ) -> NDArray[np.float32]:
-    """(n, 27) the evidence."""
+    """(n, 27) the evidence, column by column in memory."""
     n, logits = ellipses.n_nodes, bounded_logits(ellipses)
     weights = shown.weights / max(shown.weights.sum(), 1e-300)
     minor = np.sqrt(np.einsum("ij,ij->i", ellipses.semi_axes[:, 1], ellipses.semi_axes[:, 1]))
     opacities = 1.0 / (1.0 + np.exp(-logits))
     areas = np.maximum(ellipses.reaches * minor / subject.size**2, 1e-30) * opacities
-    evidence = np.empty((n, len(EVIDENCE)), np.float32)
+    evidence = np.empty((len(EVIDENCE), n), np.float32).T
     evidence[:, : len(LOCAL)] = around.local
     for column, least, most in _BOUNDS:
         np.clip(evidence[:, column], least, most, out=evidence[:, column])
@@ -133,10 +137,10 @@ def _columns(
         shown.peaks,
         np.clip(_beyond(subject, ellipses.centers) / subject.size, 0.0, 0.5),
     ]
-    for labels in pieces:
-        columns += [
-            column[labels] for column in _piece_evidence(labels, around, ellipses.centers, weights, subject.size)
-        ]
+    known = around, ellipses.centers, weights, subject.size
+    parts = [partial(_piece_evidence, labels, *known) for labels in pieces]
+    for labels, found in zip(pieces, run(parts, lambda shares: progress(sum(shares) / len(parts))), strict=True):
+        columns += [column[labels] for column in found]
     labels, counts = pieces[-1], np.bincount(pieces[-1])
     for column in (*around.local.T[[2, 5, 3]], logits, around.local[:, 1]):
         columns.append((np.bincount(labels, column) / counts)[labels])
@@ -151,7 +155,8 @@ def _beyond(subject: MainSubject, centers: NDArray[np.float64]) -> NDArray[np.fl
     for half_axis in subject.half_axes:
         length = float(np.linalg.norm(half_axis))
         if length > 0.0:
-            beyond = np.maximum(beyond, np.abs((centers - subject.center) @ (half_axis / length)) - length)
+            axis = half_axis / length
+            np.maximum(beyond, np.abs(centers @ axis - subject.center @ axis) - length, out=beyond)
     return beyond
 
 
@@ -161,12 +166,14 @@ def _piece_evidence(
     centers: NDArray[np.float64],
     weights: NDArray[np.float64],
     size: float,
+    progress: Progress,
 ) -> tuple[NDArray[np.float64], ...]:
     """Count, shown, gap and distance of each piece, (p,) each.
 
     How near a piece comes to the body is looked at where a splat of it has the body among its nearest, and nowhere but
     in a piece without such splats by a search.
     """
+    progress(0.0)
     n, spacings = len(labels), around.distances[:, -1]
     counts, shown = np.bincount(labels), np.bincount(labels, weights)
     is_body = (counts >= _BODY * n) | (shown >= _BODY)

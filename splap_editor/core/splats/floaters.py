@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.progress import Runner, StageProgress, in_turn, silent
+from splap_editor.core.progress import Progress, Runner, StageProgress, in_turn, part_of, silent
 from splap_editor.core.splats.floater_evidence import EVIDENCE, REASONS, floater_evidence
 from splap_editor.core.splats.floater_weights import CENTERS, SPREADS, WEIGHTS
 from splap_editor.core.splats.occupancy import Ellipses
 from splap_editor.core.splats.splats import Splats
-from splap_editor.core.splats.surroundings import Ties
+from splap_editor.core.splats.surroundings import Ties, in_parts
 
 _FARTHEST = 3.0
 """Evidence counts no more than this many spreads from its usual value, so that nothing unheard of decides alone."""
@@ -66,12 +66,17 @@ def floaters(splats: Splats, ellipses: Ellipses, *, stages: StageProgress = sile
     """
     evidence, ties = floater_evidence(splats, ellipses, stages=stages, run=run)
     margins, reasons = np.empty(len(evidence)), np.empty(len(evidence), np.int8)
-    # Block by block, so that what is worked on stays in the cache.
-    for lo in range(0, len(evidence), _BLOCK_NODES):
-        some = slice(lo, lo + _BLOCK_NODES)
-        shares = _shares(evidence[some])
-        margins[some] = WEIGHTS[0] + shares.sum(axis=1)
-        reasons[some] = np.argmax(shares @ _SAYS, axis=1)
+
+    def weigh(first: int, end: int, progress: Progress) -> None:
+        # Block by block, so that what is worked on stays in the cache.
+        for lo in range(first, end, _BLOCK_NODES):
+            progress((lo - first) / (end - first))
+            some = slice(lo, min(lo + _BLOCK_NODES, end))
+            shares = _shares(evidence[some])
+            margins[some] = WEIGHTS[0] + shares.sum(axis=1)
+            reasons[some] = np.argmax(shares @ _SAYS, axis=1)
+
+    in_parts(weigh, len(evidence), part_of(stages("floaters"), 0.9, 1.0), run)
     with np.errstate(over="ignore"):
         return Floaters(1.0 / (1.0 + np.exp(-margins)), reasons, ties)
 

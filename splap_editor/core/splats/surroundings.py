@@ -137,15 +137,16 @@ def surroundings(ellipses: Ellipses, *, progress: Progress = no_progress, run: R
     """
     n, centers = ellipses.n_nodes, ellipses.centers
     neighbors, distances = nearest(centers, part_of(progress, 0.0, 0.75), run)
-    local, ties = np.empty((n, len(LOCAL))), np.zeros((len(STRAY), *neighbors.shape), np.bool_)
+    # Column by column: they are looked at one at a time.
+    local, ties = np.empty((len(LOCAL), n)), np.zeros((len(STRAY), *neighbors.shape), np.bool_)
     reaches = np.maximum(ellipses.reaches, 1e-12 * ellipses.scene_scale)
     known = neighbors, distances, centers, ellipses.semi_axes, ellipses.normals, reaches, bounded_logits(ellipses)
 
     def look(first: int, end: int, progress: Progress) -> None:
         _local(first, end, *known, np.array(STRAY), local, ties)
 
-    _in_parts(look, n, part_of(progress, 0.75, 1.0), run)
-    return Surroundings(distances, local, Ties(neighbors, ties[0]), Ties(neighbors, ties[1]))
+    in_parts(look, n, part_of(progress, 0.75, 1.0), run)
+    return Surroundings(distances, local.T, Ties(neighbors, ties[0]), Ties(neighbors, ties[1]))
 
 
 def bounded_logits(ellipses: Ellipses) -> NDArray[np.float64]:
@@ -174,11 +175,11 @@ def nearest(
             neighbors[some], distances[some] = at[~own].reshape(-1, k), found[~own].reshape(-1, k)
             progress((some.stop - first) / (end - first))
 
-    _in_parts(search, n, progress, run)
+    in_parts(search, n, progress, run)
     return neighbors, distances
 
 
-def _in_parts(function: Callable[[int, int, Progress], None], n: int, progress: Progress, run: Runner) -> None:
+def in_parts(function: Callable[[int, int, Progress], None], n: int, progress: Progress, run: Runner) -> None:
     """Call a function with the bounds of each of some parts of the nodes."""
     parts = [partial(function, first, end) for first, end in pairwise(np.linspace(0, n, _PARTS + 1).astype(int))]
     run(parts, lambda shares: progress(sum(shares) / len(parts)))
@@ -187,7 +188,7 @@ def _in_parts(function: Callable[[int, int, Progress], None], n: int, progress: 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")
 def _local(first, end, neighbors, distances, centers, semi_axes, normals, reaches, logits, stray, found, ties):
-    """Fill `LOCAL` (n, 9), and for each measure of straying whether a neighbour is tied to the splat (n, k).
+    """Fill `LOCAL` (9, n), and for each measure of straying whether a neighbour is tied to the splat (n, k).
 
     For the nodes from ``first`` to ``end``.
     """
@@ -226,7 +227,7 @@ def _local(first, end, neighbors, distances, centers, semi_axes, normals, reache
             least = min(spacing, other)
             for m in range(2):
                 ties[m, i, c] = touches and d <= stray[m] * least
-        found[i, 0] = np.log(max(spacing, 1e-6 * own)) - spacings / k
-        found[i, 1] = np.log(max(spacing, 1e-6 * own) / own)
-        found[i, 2], found[i, 3], found[i, 4], found[i, 5] = mutual / k, out / k, flat / k, aligned / k
-        found[i, 6], found[i, 7], found[i, 8] = np.log(own) - sizes / k, logits[i] - opacities / k, contacts / k
+        found[0, i] = np.log(max(spacing, 1e-6 * own)) - spacings / k
+        found[1, i] = np.log(max(spacing, 1e-6 * own) / own)
+        found[2, i], found[3, i], found[4, i], found[5, i] = mutual / k, out / k, flat / k, aligned / k
+        found[6, i], found[7, i], found[8, i] = np.log(own) - sizes / k, logits[i] - opacities / k, contacts / k

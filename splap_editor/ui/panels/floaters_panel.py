@@ -145,7 +145,7 @@ class FloatersPanel(QWidget):
         self.list.setEnabled(has_some)
         if found is None:
             is_shown = self._tool.preview.is_shown
-            self.status.setText("Looking for floaters …" if is_shown else "Click the picture to look for floaters.")
+            self.status.setText(self._tool.doing if is_shown else "Click the picture to look for floaters.")
         else:
             n, k = len(found.rows), found.n_groups
             self.status.setText(

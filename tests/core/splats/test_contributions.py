@@ -51,8 +51,9 @@ def test_the_fast_loop_is_the_slow_twin(n_scales):
     ellipses = occupancy_ellipses(splats)
     weights, peaks = reference.contributions(splats, ellipses, 128)
     found = contributions(splats, ellipses)
-    np.testing.assert_allclose(found.weights, weights, rtol=1e-9, atol=1e-15)
-    np.testing.assert_allclose(found.peaks, peaks, rtol=1e-9, atol=1e-15)
+    # The loop looks a kernel's values up, and takes what lies between two for straight.
+    np.testing.assert_allclose(found.weights, weights, rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(found.peaks, peaks, rtol=1e-6, atol=1e-12)
 
 
 def test_shuffling_the_file_changes_nothing():
@@ -133,6 +134,20 @@ def test_far_floaters_are_in_no_picture_and_hide_nothing():
 def test_scenes_without_extent_have_finite_contributions(means):
     found = of(scene(means, 0.1))
     assert np.isfinite(found.weights).all() and (found.weights > 0).all() and (found.peaks <= 1.0).all()
+
+
+def test_of_very_many_splats_every_fifth_in_a_picture_stands_for_all(monkeypatch):
+    """A sheet before another: on the mean, any kind of splat gives what it gives in full pictures."""
+    means = np.concatenate([oblong(4000) * [1, 1, 0.02], oblong(4000, 1) * [0.6, 0.6, 0.02] + [0.0, 0.0, 0.3]])
+    splats = scene(means, 0.02, np.random.default_rng(2).uniform(0.2, 0.99, len(means)))
+    full = in_file_order(splats)
+    monkeypatch.setattr("splap_editor.core.splats.contributions.MANY", len(means) - 1)
+    some = in_file_order(splats)
+    near, opaque = means[:, 2] > 0.15, splats.opacities > 0.6
+    for part in (near, ~near, opaque, ~opaque):
+        # What is grown reaches a little farther over the rims of the sheets.
+        assert some[part].mean() == pytest.approx(full[part].mean(), rel=0.4)
+    assert np.corrcoef(np.log(some + 1e-6), np.log(full + 1e-6))[0, 1] > 0.85
 
 
 def test_an_empty_scene_has_none():
