@@ -7,13 +7,13 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from scipy.spatial import cKDTree
 
-from splap_editor.core.graph.options import GraphOptions, Joint, Point
+from splap_editor.core.graph.options import GraphOptions, Joint, Point, Separation
 from splap_editor.core.graph.splat_graph import SplatGraph, mended_graph
 from splap_editor.core.index_spaces import Nodes, RowPair
 from splap_editor.core.splats.occupancy import Ellipses
 from splap_editor.core.surface.geodesics import geodesic_distances
 from splap_editor.core.surface.joining import best_contacts
-from splap_editor.core.surface.separation import seam_between
+from splap_editor.core.surface.separation import Seam, seam_between
 
 RIM = 2.0
 """A joint looks for contacts up to so many times its reach from the places pointed at, along the surface."""
@@ -24,7 +24,7 @@ def stroke_mends(
     graph: SplatGraph,
     options: GraphOptions,
     *,
-    near: tuple[GraphOptions, GraphOptions] | None = None,
+    near: tuple[GraphOptions, GraphOptions, SplatGraph] | None = None,
 ) -> GraphOptions:
     """Turn strokes into the edges that they cut and add.
 
@@ -38,8 +38,9 @@ def stroke_mends(
     graph : SplatGraph
         Theirs, with nothing cut or added.
     options : GraphOptions
-    near : pair of GraphOptions, optional
-        Others and what this function gave for them: where strokes were only added since, it is gone on from.
+    near : tuple of GraphOptions, GraphOptions and SplatGraph, optional
+        Others, what this function gave for them, and the graph so mended: where strokes were only added since, it is
+        gone on from.
 
     Returns
     -------
@@ -53,18 +54,38 @@ def stroke_mends(
     """
     separate, join = options.separate, options.join
     mends = replace(options, separate=(), join=())
+    mended: SplatGraph | None = None
     if near is not None and _goes_on_from(options, near[0]):
         separate, join = separate[len(near[0].separate) :], join[len(near[0].join) :]
-        mends = replace(mends, cut=near[1].cut, add=near[1].add)
+        mends, mended = replace(mends, cut=near[1].cut, add=near[1].add), near[2]
     for stroke in separate:
-        first, second = nodes_at(ellipses, stroke.a), nodes_at(ellipses, stroke.b)
-        seam = seam_between(mended_graph(ellipses, graph, mends), first, second, wider=stroke.wider)
-        pairs = row_pairs(ellipses, seam.edges)
+        seam = stroke_seam(ellipses, mended or mended_graph(ellipses, graph, mends), stroke)
+        mended, pairs = None, row_pairs(ellipses, seam.edges)
         mends = replace(mends, cut=_sorted(set(mends.cut) | pairs), add=_sorted(_ordered(mends.add) - pairs))
     for joint in join:
-        pairs = row_pairs(ellipses, joint_contacts(ellipses, mended_graph(ellipses, graph, mends), joint))
+        tied = joint_contacts(ellipses, mended or mended_graph(ellipses, graph, mends), joint)
+        mended, pairs = None, row_pairs(ellipses, tied)
         mends = replace(mends, cut=_sorted(_ordered(mends.cut) - pairs), add=_sorted(set(mends.add) | pairs))
     return mends
+
+
+def stroke_seam(ellipses: Ellipses, graph: SplatGraph, stroke: Separation) -> Seam:
+    """What a separation cuts in a graph; what was found last in it is found at once, as when its preview is taken.
+
+    Raises
+    ------
+    ValueError
+        Both parts are nearest to the same splat.
+    """
+    known = _LAST_SEAM.get(graph)
+    if known is None or known[0] != stroke:
+        first, second = nodes_at(ellipses, stroke.a), nodes_at(ellipses, stroke.b)
+        known = _LAST_SEAM[graph] = stroke, seam_between(graph, first, second, wider=stroke.wider)
+    return known[1]
+
+
+_LAST_SEAM: WeakKeyDictionary[SplatGraph, tuple[Separation, Seam]] = WeakKeyDictionary()
+"""Of graphs that are in use."""
 
 
 def joint_contacts(ellipses: Ellipses, graph: SplatGraph, joint: Joint) -> Nodes:

@@ -94,7 +94,7 @@ def mended_stages(
     """
     with timed("mends"):
         progress = stages("mends")
-        mends = stroke_mends(ellipses, before.unmended, options, near=(before.options, before.mends))
+        mends = stroke_mends(ellipses, before.unmended, options, near=(before.options, before.mends, before.graph))
         is_plain = not mends.cut and not mends.add
         graph = before.unmended if is_plain else mended_graph(ellipses, before.unmended, mends)
         progress(0.2)

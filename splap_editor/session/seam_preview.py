@@ -10,8 +10,7 @@ from scipy.spatial import cKDTree
 
 from splap_editor.core.graph.options import Separation
 from splap_editor.core.index_spaces import FileRows
-from splap_editor.core.surface.separation import seam_between
-from splap_editor.engine.strokes import nodes_at
+from splap_editor.engine.strokes import stroke_seam
 from splap_editor.engine.surface import Surface
 
 N_BESIDE = 8
@@ -48,8 +47,7 @@ def found_seam(surface: Surface, stroke: Separation) -> FoundSeam:
         Both parts are nearest to the same splat.
     """
     ellipses = surface.ellipses
-    first, second = nodes_at(ellipses, stroke.a), nodes_at(ellipses, stroke.b)
-    edges = seam_between(surface.graph, first, second, wider=stroke.wider).edges
+    edges = stroke_seam(ellipses, surface.graph, stroke).edges
     line, length = seam_line(ellipses.centers[edges].mean(axis=1))
     return FoundSeam(stroke, ellipses.rows[edges], line, length)
 

@@ -109,16 +109,24 @@ def test_what_was_cut_by_hand_may_come_apart(slit):
     assert not checked(slit, opened(slit, 0.05)).places
 
 
-def test_what_touches_and_hangs_together_the_long_way_round_may_part():
+def test_what_tore_is_told_wherever_else_it_hangs_together():
     splats = sheet(N)
     y = splats.means[:, 1]
     far = tuple((a, b) for a, b in slit_rows(splats) if max(y[a], y[b]) > 0.15)
     surface = as_if_plain(surface_of(splats, GraphOptions(cut=far)))
     assert surface.graph.components.max() == 0
-    parted = surface.rest[:, 1:2] > 0.5
-    assert not checked(surface, np.where(parted, opened(surface, 0.05), surface.rest)).places
-    near = surface.rest[:, 1:2] > 0.2
-    assert checked(surface, np.where(near, opened(surface, 0.05), surface.rest)).places[0].kind == "tear"
+    for hinge in (0.2, 0.5):
+        torn = surface.rest[:, 1:2] > hinge
+        (tear,) = checked(surface, np.where(torn, opened(surface, 0.05), surface.rest)).places
+        assert tear.kind == "tear"
+
+
+def test_one_surface_lifted_off_another_that_it_rests_on_is_no_tear():
+    surface = surface_of(joined(sheet(N), sheet(N, height=0.3 * STEP, seed=1)), GraphOptions())
+    upper = surface.rest[:, 2] > 0.15 * STEP
+    assert surface.graph.components.max() == 1
+    rise = np.where(upper, 0.3 * np.maximum(surface.rest[:, 1] - 0.2, 0.0), 0.0)
+    assert not checked(surface, surface.rest + rise[:, None] * [0.0, 0.0, 1.0]).places
 
 
 @pytest.mark.parametrize("gap", [0.0, 0.004])

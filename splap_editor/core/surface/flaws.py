@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.sparse.csgraph import connected_components
 
 from splap_editor.core.index_spaces import Nodes
 from splap_editor.core.surface.posed_surface import PosedSurface
@@ -14,17 +14,14 @@ from splap_editor.core.surface.spikes import spikes
 from splap_editor.core.surface.tears import OPEN, tears
 from splap_editor.core.surface.webs import parted_about, webs
 
-LEAST_PAIRS = {"tear": 3, "web": 1, "spike": 1}
-"""A place of fewer pairs is left out: one splat that comes off is no tear."""
+LEAST_RIM = 2
+"""Splats on either side of a tear: one that comes off, or drifts by, is none however many lie about it."""
 
 SEEN = 1e-5
 """What fills less of a picture is not seen, in units of s²: about three pixels of one 600 wide."""
 
-LONGEST_WAY = 0.15
-"""From one side of a tear to the other round its nearer end, in units of s, where both are of one piece.
-
-Two parts that touch hang together too, by a longer way, and may part; one that is torn right through comes off.
-"""
+SURE = np.log(10.0)
+"""Odds of a place, those of its signs together, that it is what it is told for: a false alarm is worse than a miss."""
 
 _MOST_STRAIN = 4.0
 
@@ -58,14 +55,14 @@ class Flaw:
 class _Signs(NamedTuple):
     """Signs of one kind of flaw.
 
-    Pairs (P, 2) of nodes, by how much they grew in units of s, how many times, and which are sure.
+    Pairs (P, 2) of nodes, by how much they grew in units of s, how many times, and the logarithm of their odds.
     """
 
     kind: str
     pairs: Nodes
     longer: NDArray[np.float64]
     strains: NDArray[np.float64]
-    are_sure: NDArray[np.bool_]
+    odds: NDArray[np.float64]
 
 
 def flaws(posed: PosedSurface, rest_axes: NDArray[np.float32], epsilon: float) -> list[Flaw]:
@@ -87,15 +84,15 @@ def flaws(posed: PosedSurface, rest_axes: NDArray[np.float32], epsilon: float) -
         Worst first; nothing that is too small to be seen, or hidden.
     """
     torn = tears(posed, epsilon)
-    drawn = webs(posed, torn.pairs)
+    drawn = webs(posed, torn.others)
     nodes, growths = spikes(posed, rest_axes)
     alone = ~np.isin(nodes, np.concatenate([torn.pairs.ravel(), drawn.links.ravel()]))
     nodes, growths = nodes[alone], growths[alone]
     lengths = 4.0 * np.sqrt(np.square(posed.axes[nodes]).sum(axis=2).max(axis=1, initial=0.0)) / posed.scale
     signs = (
-        _Signs("tear", torn.pairs, torn.gaps, _strains(posed, torn.pairs), np.ones(len(torn.pairs), bool)),
-        _Signs("web", drawn.links, drawn.longer, _strains(posed, drawn.links), drawn.are_sure),
-        _Signs("spike", np.stack([nodes, nodes], axis=1), lengths, growths - 1.0, np.ones(len(nodes), bool)),
+        _Signs("tear", torn.pairs, torn.gaps, _strains(posed, torn.pairs), torn.odds),
+        _Signs("web", drawn.links, drawn.longer, _strains(posed, drawn.links), drawn.odds),
+        _Signs("spike", np.stack([nodes, nodes], axis=1), lengths, growths - 1.0, np.full(len(nodes), np.inf)),
     )
     found = [flaw for each in signs for flaw in _places(posed, each, drawn.parted)]
     return sorted(found, key=lambda flaw: -flaw.severity)
@@ -118,7 +115,7 @@ def _places(posed: PosedSurface, signs: _Signs, parted: Nodes) -> list[Flaw]:
     order = np.argsort(labels, kind="stable")
     for own in np.split(order, np.flatnonzero(np.diff(labels[order])) + 1):
         size = float(signs.longer[own].max())
-        if len(own) < LEAST_PAIRS[signs.kind] or size < OPEN or not signs.are_sure[own].any():
+        if size < OPEN or signs.odds[own].sum() < SURE:
             continue
         nodes = np.unique(pairs[own])
         seen = posed.seen[nodes]
@@ -130,7 +127,7 @@ def _places(posed: PosedSurface, signs: _Signs, parted: Nodes) -> list[Flaw]:
             about = parted_about(posed, across, parted)
             across = _farthest(posed, about if len(about) else across)
         first, second = _sides(posed, across)
-        if signs.kind == "tear" and not _are_one(posed, first, second):
+        if signs.kind == "tear" and min(len(first), len(second)) < LEAST_RIM:
             continue
         severity = float(seen @ strains[nodes])
         found.append(Flaw(signs.kind, nodes, first, second, size * posed.scale, severity))
@@ -152,14 +149,6 @@ def _farthest(posed: PosedSurface, pairs: Nodes) -> Nodes:
     rest, moved = posed.distances(pairs)
     grown = moved - rest
     return pairs[grown >= 0.8 * grown.max()]
-
-
-def _are_one(posed: PosedSurface, first: Nodes, second: Nodes) -> bool:
-    """Whether both sides hang together nearby, or not at all: what is far along one piece may rightly part."""
-    if not np.isin(posed.pieces[first], posed.pieces[second]).any():
-        return True
-    way = dijkstra(posed.ways, directed=False, indices=first, limit=LONGEST_WAY, min_only=True)
-    return bool(np.isfinite(way[second]).any())
 
 
 def _sides(posed: PosedSurface, pairs: Nodes) -> tuple[Nodes, Nodes]:

@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from splap_editor.core.compressed_rows import gathered
@@ -112,11 +111,6 @@ class PosedSurface:
         pairs = np.stack([starts[kept], self.L.indices[kept]], axis=1)
         lengths = np.maximum(_distances(self.ellipses.centers, pairs) / self.scale, np.finfo(float).tiny)
         return sp.csr_array((lengths, (pairs[:, 0], pairs[:, 1])), shape=self.L.shape)
-
-    @cached_property
-    def pieces(self) -> NDArray[np.int32]:
-        """(n,) piece that each node is of; nothing pulls from one to another."""
-        return connected_components(self.ways, directed=False)[1]
 
     @cached_property
     def partings(self) -> tuple[NDArray[np.int32], NDArray[np.float64]]:

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.sparse.csgraph import dijkstra
 
 from splap_editor.core.index_spaces import Nodes
 from splap_editor.core.surface.posed_surface import PosedSurface, near_rows
@@ -13,13 +14,20 @@ from splap_editor.core.surface.tears import slants
 LONGER, STRETCHED = 0.003, 1.15
 """What grew by less, in units of s and of its length, is no web."""
 
-WEIGHTS = (-7.5, 0.2, 0.7, 3.6, 2.3, 2.8)
+WEIGHTS = (-5.35, 0.26, 0.72, 2.56, 2.36, 2.25)
 """Of 1 and each evidence."""
 
-SURE = np.log(4.0)
-"""Odds of at least one link of a place: a false alarm is worse than a web that is missed."""
+LOOKED_AT = -1.0
+"""Odds from which a link is looked at again,"""
+
+LOOKED_AGAIN = (-2.29, 0.56, 2.03)
+"""by 1, these odds and the logarithm of the way round; that is looked for up to"""
+
+MOST_DETOUR = 6.0
+"""so many times the link's length."""
 
 _MOST_BESIDE = 20.0
+_AT_ONCE = 64
 
 
 class Webs(NamedTuple):
@@ -31,32 +39,34 @@ class Webs(NamedTuple):
         Nodes i < j.
     longer : (W,) float64
         By how much they grew, in units of s.
-    are_sure : (W,) bool
-        Those that tell a place; the others, which lie beside, tell how large it is.
+    odds : (W,) float64
+        Logarithm of how many times likelier each is a web than none; all above 0.
     parted : (Q, 2) int
         What rightly parted beside them, and elsewhere.
     """
 
     links: Nodes
     longer: NDArray[np.float64]
-    are_sure: NDArray[np.bool_]
+    odds: NDArray[np.float64]
     parted: Nodes
 
 
-def webs(posed: PosedSurface, torn: Nodes) -> Webs:
+def webs(posed: PosedSurface, parted: Nodes) -> Webs:
     """Find what a pose draws out between two parts.
 
     A neck that is bent or pulled stretches all through: beside it is nothing.
     Beside a web are the two surfaces that it ties, which came apart. So a link
     that grew is one if, beside it, splats parted of which one is near its one
     end along the surface and the other near its other; if it grew more than all
-    around it, is long, and rises out of the tangent planes.
+    around it, is long, and rises out of the tangent planes. What passes for one
+    by all that is looked at again, together: without them, a web's two ends are
+    far apart.
 
     Parameters
     ----------
     posed : PosedSurface
-    torn : (T, 2) int
-        Parted pairs that should not have parted: strands across a tear are no webs.
+    parted : (Q, 2) int
+        Pairs of two surfaces that parted: strands across a tear are no webs.
 
     Returns
     -------
@@ -64,12 +74,13 @@ def webs(posed: PosedSurface, torn: Nodes) -> Webs:
     """
     links, grown = grown_links(posed)
     _, rest, moved = posed.links
-    longer, parted = (moved - rest)[grown] / posed.scale, rightly_parted(posed, torn)
+    longer = (moved - rest)[grown] / posed.scale
     if not len(links):
-        return Webs(links, longer, np.zeros(0, bool), parted)
-    odds = evidence(posed, links, grown, parted) @ np.array(WEIGHTS)
-    is_web = odds > 0.0
-    return Webs(links[is_web], longer[is_web], odds[is_web] > SURE, parted)
+        return Webs(links, longer, np.zeros(0), parted)
+    weighed = evidence(posed, links, grown, parted) @ np.array(WEIGHTS)
+    odds = np.column_stack([np.ones(len(links)), weighed, detours(posed, links, weighed)]) @ np.array(LOOKED_AGAIN)
+    is_web = (weighed > LOOKED_AT) & (odds > 0.0)
+    return Webs(links[is_web], longer[is_web], odds[is_web], parted)
 
 
 def grown_links(posed: PosedSurface) -> tuple[Nodes, NDArray[np.bool_]]:
@@ -102,6 +113,41 @@ def evidence(posed: PosedSurface, links: Nodes, grown: NDArray[np.bool_], parted
     )
 
 
+def detours(posed: PosedSurface, links: Nodes, weighed: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(W,) logarithm of how many times as long the way is from one end to the other without what may be a web.
+
+    What a web ties hangs together by it alone, for some way around; a link of one surface has its neighbours beside.
+
+    Parameters
+    ----------
+    posed : PosedSurface
+    links : (W, 2) int
+    weighed : (W,) float64
+        Their odds by `evidence`: 0 is given to those below `LOOKED_AT`, which are none, and are left in the way.
+    """
+    n, found = posed.n_nodes, np.zeros(len(links))
+    asked = np.flatnonzero(weighed > LOOKED_AT)
+    if not len(asked):
+        return found
+    links = links[asked]
+    nodes = np.unique(links)
+    for _ in range(2):
+        nodes = np.union1d(nodes, near_rows(posed.neighborhoods, nodes).indices)
+    ways = posed.ways[nodes][:, nodes].tocoo()
+    keys = np.minimum(ways.row, ways.col).astype(np.int64) * n + np.maximum(ways.row, ways.col)
+    own = np.sort(np.searchsorted(nodes, links), axis=1)
+    kept = ~np.isin(keys, own @ np.array([n, 1]))
+    left = sp.csr_array((ways.data[kept], (ways.row[kept], ways.col[kept])), shape=ways.shape)
+    lengths = np.maximum(posed.distances(links)[0] / posed.scale, np.finfo(float).tiny)
+    limit = MOST_DETOUR * float(lengths.max())
+    for start in range(0, len(own), _AT_ONCE):
+        run = slice(start, start + _AT_ONCE)
+        sources, places = np.unique(own[run, 0], return_inverse=True)
+        apart = dijkstra(left, directed=False, indices=sources, limit=limit)[places, own[run, 1]]
+        found[asked[run]] = np.log(np.clip(apart / lengths[run], 1.0, MOST_DETOUR))
+    return found
+
+
 def _around(posed: PosedSurface, links: Nodes, values: NDArray[np.float64]) -> NDArray[np.float64]:
     """(n,) mean of the links' values at each node's neighbours and itself."""
     n = posed.n_nodes
@@ -124,9 +170,3 @@ def parted_about(posed: PosedSurface, links: Nodes, parted: Nodes) -> Nodes:
     near = np.zeros(posed.n_nodes, bool)
     near[near_rows(posed.neighborhoods, np.unique(links)).indices] = True
     return parted[near[parted[:, 0]] & near[parted[:, 1]]]
-
-
-def rightly_parted(posed: PosedSurface, torn: Nodes) -> Nodes:
-    """(Q, 2) parted pairs but for those that the surface was torn between."""
-    n, (pairs, _) = posed.n_nodes, posed.partings
-    return pairs[~np.isin(pairs @ np.array([n, 1]), torn @ np.array([n, 1]))]
