@@ -9,7 +9,8 @@ from splap_editor.core.graph.options import GraphOptions, Joint, Separation
 from splap_editor.core.graph.splat_graph import mended_graph
 from splap_editor.core.splats.occupancy import occupancy_ellipses
 from splap_editor.core.splats.splats import Splats
-from splap_editor.engine.strokes import stroke_mends
+from splap_editor.core.surface.separation import seam_between
+from splap_editor.engine.strokes import nodes_at, stroke_mends, stroke_seam
 from splap_editor.engine.surface import surface_of
 from splap_editor.io.recipe import Edit, RecipeError, read_recipe, recipe_from_json, recipe_to_json, write_recipe
 
@@ -66,6 +67,17 @@ def test_the_surface_is_the_same_to_the_bit_whichever_way_it_came_about(way: str
     assert made.stages.mends == fresh.stages.mends
     explicit = mended_graph(ellipses, fresh.stages.unmended, fresh.stages.mends)
     np.testing.assert_array_equal(explicit.indices, made.graph.indices)
+
+
+def test_a_seam_is_looked_for_once_and_each_stroke_has_its_own() -> None:
+    surface = surface_of(leaves(0.1), GraphOptions())
+    ellipses, graph = surface.ellipses, surface.graph
+    strokes = [Separation(A, B), Separation(A, ((0.4, 0.7, 0.0),)), Separation(A, B, wider=1)]
+    for stroke in (*strokes, *strokes):
+        found = stroke_seam(ellipses, graph, stroke)
+        first, second = nodes_at(ellipses, stroke.a), nodes_at(ellipses, stroke.b)
+        np.testing.assert_array_equal(found.edges, seam_between(graph, first, second, wider=stroke.wider).edges)
+        assert stroke_seam(ellipses, graph, stroke) is found
 
 
 def test_no_stroke_changes_nothing() -> None:
