@@ -21,9 +21,14 @@ if TYPE_CHECKING:
 UPS = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1), "-x": (-1, 0, 0), "-y": (0, -1, 0), "-z": (0, 0, -1)}
 
 
+def add_output_path(parser: argparse.ArgumentParser) -> None:
+    """Add the flag that names the file to write."""
+    parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.ply")
+
+
 def add_clean(parser: argparse.ArgumentParser) -> None:
     """Add the flags of ``splap-editor clean``."""
-    parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.ply")
+    add_output_path(parser)
     parser.add_argument(
         "--strength",
         type=float,
@@ -38,7 +43,7 @@ def add_clean(parser: argparse.ArgumentParser) -> None:
 
 def add_place(parser: argparse.ArgumentParser) -> None:
     """Add the flags of ``splap-editor place``; what they say is done in this order."""
-    parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.ply")
+    add_output_path(parser)
     parser.add_argument(
         "--floor",
         type=int,
@@ -68,8 +73,8 @@ def clean(options: argparse.Namespace) -> int:
     report = StageReport(quiet=options.quiet or options.json)
     steps = [RemovalStep(PickedFloaters(strength))]
     if options.crop is not None:
-        steps.insert(0, RemovalStep(_crop_box(options.crop), outside=True))
-    file = _read(options, report)
+        steps.insert(0, RemovalStep(picked_box(options.crop, "--crop"), outside=True))
+    file = read_input(options, report)
     counts: list[float] = []
     removal, sizes = removal_of((), file.splats), [occupancy_ellipses(file.splats).scene_scale]
     with report("floaters"):
@@ -77,13 +82,13 @@ def clean(options: argparse.Namespace) -> int:
             before = removal.n_removed
             removal = removal_of((*removal.steps, step), file.splats)
             counts.append(removal.n_removed - before)
-    summary = _write(options, file, Edit(removal=removal), report)
+    summary = write_edited(options, file, Edit(removal=removal), report)
     told = dict(zip(("cropped", "floaters") if len(counts) > 1 else ("floaters",), counts, strict=True))
     if options.report:
         sizes.append(_size(file, removal))
         told |= {"size_before": sizes[0], "size_after": sizes[1]}
         report.say(", ".join(f"{name.replace('_', ' ')} {value:,.6g}" for name, value in told.items()))
-    return _tell(options, report, summary, told)
+    return tell_written(options, report, summary, told)
 
 
 def place(options: argparse.Namespace) -> int:
@@ -91,10 +96,10 @@ def place(options: argparse.Namespace) -> int:
     from splap_editor.engine.edit import Edit
 
     report = StageReport(quiet=options.quiet or options.json)
-    file = _read(options, report)
+    file = read_input(options, report)
     made = _place(options, file)
-    summary = _write(options, file, Edit(place=made), report)
-    return _tell(options, report, summary, {"matrix": made.matrix.tolist()})
+    summary = write_edited(options, file, Edit(place=made), report)
+    return tell_written(options, report, summary, {"matrix": made.matrix.tolist()})
 
 
 def _place(options: argparse.Namespace, file: "SplatFile") -> "Place":
@@ -145,15 +150,16 @@ def _points(file: "SplatFile", rows: "list[FileRow]") -> "np.ndarray":
     return np.asarray(file.splats.means, np.float64)[rows]
 
 
-def _crop_box(crop: list[float]) -> "PickedBox":
+def picked_box(corners: list[float], flag: str) -> "PickedBox":
+    """Box between two corners that a flag gives: least x, y, z, then greatest; a ValueError names the flag."""
     import numpy as np
 
     from splap_editor.core.removal import PickedBox
 
-    ends = np.array(crop).reshape(2, 3)
+    ends = np.array(corners).reshape(2, 3)
     size = ends[1] - ends[0]
     if not (size > 0.0).all() or not np.isfinite(ends).all():
-        raise ValueError("--crop needs the least and then the greatest x, y and z of a box")
+        raise ValueError(f"{flag} needs the least and then the greatest x, y and z of a box")
     cx, cy, cz = ends.mean(axis=0).tolist()
     sx, sy, sz = size.tolist()
     return PickedBox((cx, cy, cz), (sx, sy, sz))
@@ -165,7 +171,8 @@ def _size(file: "SplatFile", removal: "Removal") -> float:
     return occupancy_ellipses(file.splats, removed=removal.mask).scene_scale
 
 
-def _read(options: argparse.Namespace, report: StageReport) -> "SplatFile":
+def read_input(options: argparse.Namespace, report: StageReport) -> "SplatFile":
+    """Read the file that a command is given, and say what to know about it."""
     from splap_editor.io.splat_files import read_splats
 
     with report("read"):
@@ -175,15 +182,19 @@ def _read(options: argparse.Namespace, report: StageReport) -> "SplatFile":
     return file
 
 
-def _write(options: argparse.Namespace, file: "SplatFile", edit: "Edit", report: StageReport) -> "ExportReport":
+def write_edited(options: argparse.Namespace, file: "SplatFile", edit: "Edit", report: StageReport) -> "ExportReport":
+    """Write a file as an edit without handles has it."""
+    from splap_editor.engine.bound_edit import posed
     from splap_editor.engine.scripting import write_posed
 
-    summary = write_posed(options.output, file, None, edit, stages=report.stage)
+    made = posed(file, edit, stages=report.stage)
+    summary = write_posed(options.output, file, None, edit, surface=made.surface, stages=report.stage)
     report.end_stage()
     return summary
 
 
-def _tell(options: argparse.Namespace, report: StageReport, summary: "ExportReport", told: dict) -> int:
+def tell_written(options: argparse.Namespace, report: StageReport, summary: "ExportReport", told: dict) -> int:
+    """Say what was written, in words or as one JSON object with some facts more."""
     report.say(str(summary))
     if options.json:
         facts = {name: value for name, value in vars(summary).items() if name != "path"}

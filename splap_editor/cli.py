@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import splap_editor
+from splap_editor.arranging_cli import add_grade
 from splap_editor.cleaning_cli import add_clean, add_place
 from splap_editor.core.graph.options import EDGE_OPTIONS, GraphOptions
 from splap_editor.core.options import options_of
@@ -73,6 +74,7 @@ def _parser() -> argparse.ArgumentParser:
     for name, text, add in (
         ("clean", "remove floaters, and what lies outside a box", add_clean),
         ("place", "level, turn, scale and move a whole scene", add_place),
+        ("grade", "change colours and opacities, of all splats or of some", add_grade),
     ):
         command = commands.add_parser(name, help=text)
         _add_input(command)
@@ -228,6 +230,7 @@ def _deform(options: argparse.Namespace) -> int:
         file,
         made.kernels,
         made.edit,
+        surface=made.surface,
         columns=columns,
         snapshot=made.snapshot if columns else None,
         as_3dgs=options.as_3dgs,
@@ -338,7 +341,7 @@ def _graph(options: argparse.Namespace) -> int:
     return EXIT_OK
 
 
-_COMMANDS = ("edit", "deform", "convert", "clean", "place", "render", "info", "graph", *installation.NAMES)
+_COMMANDS = ("edit", "deform", "convert", "clean", "place", "grade", "render", "info", "graph", *installation.NAMES)
 
 
 def _readable(info: dict, indent: str = "") -> str:

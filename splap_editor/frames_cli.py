@@ -111,7 +111,7 @@ def render(options: argparse.Namespace) -> int:
         output.mkdir(parents=True, exist_ok=True)
         output = output / f"{file.path.stem}.png"
     with report("scene"):
-        studio, view = _studio(options, held, file, poser.edit)
+        studio, view = _studio(options, held, file, poser)
     try:
 
         def draw_view(seen: "View") -> "NDArray[np.uint8]":
@@ -155,13 +155,13 @@ def _prepared(
         report.say(f"note: {warning}")
     edit = edit_for(held, file, report.say)
     cache = None if options.no_cache else StageCache(say=lambda text: report.say(f"note: {text}"))
-    _, bound = bound_file(file, edit, cache=cache, stages=report.stage, run=side_by_side())
+    surface, bound = bound_file(file, edit, cache=cache, stages=report.stage, run=side_by_side())
     report.end_stage()
-    return file, FramePoser(edit, bound)
+    return file, FramePoser(edit, bound, surface)
 
 
 def _studio(
-    options: argparse.Namespace, held: plain.Edit | SessionFile | None, file: "SplatFile", edit: "Edit"
+    options: argparse.Namespace, held: plain.Edit | SessionFile | None, file: "SplatFile", poser: "FramePoser"
 ) -> tuple["Studio", "View"]:
     """The scene off screen as the session shows it, with the choices of the command line over that."""
     import numpy as np
@@ -181,7 +181,9 @@ def _studio(
     width, height = options.size
     is_of_file = session is not None and session.ply.n_splats == file.splats.n_splats
     hidden = session.hidden if session is not None and is_of_file else None
-    studio = Studio(file.splats, look_named(display), width, height, hidden=hidden, removed=edit.removed)
+    edit = poser.edit
+    splats = edit.grading.graded(file.splats, poser.surface)
+    studio = Studio(splats, look_named(display), width, height, hidden=hidden, removed=edit.removed)
     studio.viewport.set_background(*background_named(display))
     studio.viewport.show_place(edit.place)
     if session is None or session.view is None:

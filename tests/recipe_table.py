@@ -5,6 +5,7 @@
 
 from splap_editor.core.camera_path import CameraPose
 from splap_editor.core.deformers import DEFORMERS, method_titles
+from splap_editor.core.grade_options import GradeOptions
 from splap_editor.core.options import Option, ShareOfSize, options_of
 from splap_editor.core.presets import PRESETS
 from splap_editor.core.reach_options import CageOptions
@@ -39,6 +40,12 @@ def recipe_table() -> str:
             "Splats left out of everything, first of all and in the file's coordinates: an object, or a list of them "
             f"taken in order. Each has one of `rows` · {kinds}; `outside`: all others are meant; `restore`: they come "
             "back",
+        ),
+        (
+            "grade",
+            "Colour grades, each over those before: an object, or a list of them. Each is of what `rows` or one of the "
+            "keys of `remove` picks at rest, or of all splats; `outside`: of all others. "
+            + " ".join(f"`{name}`: {_told(known)}" for name, known in options_of(GradeOptions).items()),
         ),
         ("place", "`center`, `translate`, `rotate` (w, x, y, z), `scale`: all of it as one body, last of all"),
         (

@@ -162,7 +162,7 @@ def picked_splats(picked: PickedRows | PickedBox | PickedBall | PickedSide, mean
         found = np.zeros(len(means), bool)
         if len(picked.rows) and not 0 <= picked.rows[0] <= picked.rows[-1] < len(means):
             raise ValueError(
-                f"remove names row {picked.rows[-1]}, but the file has rows 0 to {len(means) - 1}: "
+                f"row {picked.rows[-1]} is named, but the file has rows 0 to {len(means) - 1}: "
                 "the recipe was made for another file"
             )
         found[picked.rows] = True

@@ -66,7 +66,7 @@ class Posed:
     @property
     def splats(self) -> Splats:
         """Splats to write, removed ones included: those of the file, with the changed rows replaced, in their place."""
-        return written_splats(self.rest, self.kernels, self.edit)
+        return written_splats(self.rest, self.kernels, self.edit, self.surface)
 
     @property
     def snapshot(self) -> Snapshot:
@@ -220,7 +220,8 @@ def posed(
     ----------
     file : SplatFile
     edit : Edit, of a scene or plain
-        Without an enabled handle everything stays at rest, and no surface is made unless it is wanted.
+        Without an enabled handle everything stays at rest, and no surface is made unless it or a grade's falloff is
+        wanted.
     cache, run
         As of `bind`.
     stages : callable
@@ -249,7 +250,7 @@ def bound_file(
     with_surface: bool = False,
 ) -> tuple[Surface | None, BoundEdit | None]:
     """Make the surface of a file and bind an edit to it, as far as needed; parameters as of `posed`."""
-    if not edit.active_handles and not with_surface:
+    if not edit.active_handles and not with_surface and not edit.grading.needs_surface:
         return None, None
     surface = surface_of(file.splats, edit.graph, removed=edit.removed, cache=cache, stages=stages)
     if not edit.active_handles:
@@ -257,10 +258,10 @@ def bound_file(
     return surface, bind(surface, edit, cache=cache, progress=stages("bind"), run=run)
 
 
-def written_splats(rest: Splats, kernels: AdaptedKernels | None, edit: Edit) -> Splats:
-    """Splats to write: as adapted, then in their place."""
+def written_splats(rest: Splats, kernels: AdaptedKernels | None, edit: Edit, surface: Surface | None = None) -> Splats:
+    """Splats to write: as adapted, then graded, then in their place; ``surface`` is needed by a grade's falloff."""
     splats = rest if kernels is None else adapted_splats(rest, kernels)
-    return placed_splats(splats, edit.place)
+    return placed_splats(edit.grading.graded(splats, surface), edit.place)
 
 
 def ready_for_drags(surface: Surface, cache: StageCache | None = None) -> None:

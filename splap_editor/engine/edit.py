@@ -1,4 +1,4 @@
-"""The edit: handles and their poses, pins, options, what is removed and where all of it stands, as one value."""
+"""The edit: handles and their poses, pins, options, what is removed, graded and where all stands, as one value."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
@@ -14,6 +14,7 @@ from splap_editor.core.options import Length
 from splap_editor.core.pose import Pose
 from splap_editor.core.reach_options import CageOptions
 from splap_editor.core.timeline import Timeline
+from splap_editor.engine.grading import Grading
 from splap_editor.engine.removal import Removal
 
 HANDLE_COLORS = ("#f2a93b", "#4fb3ff", "#7bd66b", "#e66fb0", "#b18cff", "#ff7a59", "#30bfae", "#d9d24a")
@@ -97,10 +98,13 @@ class Edit(BaseEdit[Handle, Pin]):
         Poses at other frames than the one shown.
     removal : Removal
         Splats that are left out of everything; handles, pins and mends go on counting in the file's rows.
+    grading : Grading
+        Colour grades; neither surface nor pose goes by them.
     """
 
     timeline: Timeline = field(default_factory=Timeline)
     removal: Removal = field(default_factory=Removal)
+    grading: Grading = field(default_factory=Grading)
 
     @property
     def graph(self) -> GraphOptions:
@@ -128,9 +132,9 @@ class Edit(BaseEdit[Handle, Pin]):
 
     @property
     def is_identity(self) -> bool:
-        """Whether a file is written as it was read: no enabled handle is moved, nothing left out, all in its place."""
+        """Whether a file is written as it was read: nothing is moved, left out, graded or put in another place."""
         is_at_rest = all(handle.pose.is_identity for handle in self.active_handles)
-        return is_at_rest and self.removed is None and self.place.is_identity
+        return is_at_rest and self.removed is None and self.place.is_identity and self.grading.is_identity
 
     @property
     def has_work(self) -> bool:
@@ -220,4 +224,4 @@ def poses_like(a: Edit, b: Edit) -> bool:
 
 def writes_like(a: Edit, b: Edit) -> bool:
     """Whether two edits make the same file of the same splats."""
-    return binds_like(a, b) and poses_like(a, b) and a.place == b.place
+    return binds_like(a, b) and poses_like(a, b) and a.place == b.place and a.grading.like(b.grading)

@@ -31,6 +31,8 @@ class ExportReport:
         Rows of the source that are not in the file.
     is_placed : bool
         Everything was moved, turned or scaled as one body.
+    is_graded : bool
+        Colours or opacities were changed.
     check : DeformationCheck, optional
         What the pose spoils, where it was looked at.
     """
@@ -42,10 +44,12 @@ class ExportReport:
     largest_stretch: float
     n_removed: int = 0
     is_placed: bool = False
+    is_graded: bool = False
     check: "DeformationCheck | None" = None
 
     def __str__(self) -> str:
-        parts = [f"{self.path.name}: {self.n_splats:,} splats, unchanged"]
+        kept = "none of them moved" if self.is_graded else "unchanged"
+        parts = [f"{self.path.name}: {self.n_splats:,} splats, {kept}"]
         if self.n_changed:
             parts = [
                 f"{self.path.name}: {self.n_changed:,} of {self.n_splats:,} splats changed",
@@ -54,6 +58,7 @@ class ExportReport:
             ]
         parts += [f"{self.n_removed:,} removed"] if self.n_removed else []
         parts += ["all of them put in their place"] if self.is_placed else []
+        parts += ["colours graded"] if self.is_graded else []
         parts += [f"look at {self.check}"] if self.check is not None and self.check.places else []
         return ", ".join(parts)
 
@@ -67,9 +72,10 @@ def export_report(
 ) -> ExportReport:
     """Compare adapted kernels with the splats they came from, before these are put in their place."""
     n_removed = edit.removal.n_removed
-    n_written, is_placed = splats.n_splats - n_removed, not edit.place.is_identity
+    n_written = splats.n_splats - n_removed
+    is_placed, is_graded = not edit.place.is_identity, not edit.grading.is_identity
     if kernels is None or not kernels.changed.any():
-        return ExportReport(path, n_written, 0, 0.0, 1.0, n_removed, is_placed, check)
+        return ExportReport(path, n_written, 0, 0.0, 1.0, n_removed, is_placed, is_graded, check)
     rows = np.flatnonzero(kernels.changed)
     moved = kernels.means[rows] - np.asarray(splats.means, np.float64)[rows]
     with np.errstate(invalid="ignore", over="ignore"):
@@ -83,5 +89,6 @@ def export_report(
         float(np.exp(growth.max())) if growth.size else 1.0,
         n_removed,
         is_placed,
+        is_graded,
         check,
     )

@@ -38,10 +38,13 @@ class FramePoser:
     edit : Edit
     bound : BoundEdit or None
         Bound for the edit; None where no handle is enabled.
+    surface : Surface, optional
+        Of the scene; needed by a grade that fades out along it.
     """
 
     edit: Edit
     bound: BoundEdit | None
+    surface: Surface | None = None
 
     def kernels(self, frame: int | None, *, progress: Progress = no_progress) -> AdaptedKernels | None:
         """Adapted kernels at a frame, or of the poses that the edit itself holds; None without a handle."""
@@ -61,10 +64,10 @@ def frame_poser(
 ) -> FramePoser:
     """Bind the deformer of an edit; ``surface`` is needed where it has an enabled handle."""
     if not edit.active_handles:
-        return FramePoser(edit, None)
+        return FramePoser(edit, None, surface)
     if surface is None:
         raise ValueError("an edit with an enabled handle needs the surface of the scene")
-    return FramePoser(edit, bind(surface, edit, cache=cache, progress=progress, run=run))
+    return FramePoser(edit, bind(surface, edit, cache=cache, progress=progress, run=run), surface)
 
 
 def frame_range(text: str, n_frames: int) -> range:
@@ -147,7 +150,7 @@ def write_frames(
     for done, kernels in _posed(poser, frames, progress):
         frame = frames[done]
         written.append(frame_path(path, frame, frames[-1]))
-        write_posed(written[-1], file, kernels, poser.edit, as_3dgs=as_3dgs)
+        write_posed(written[-1], file, kernels, poser.edit, surface=poser.surface, as_3dgs=as_3dgs)
         progress((done + 1) / len(frames))
     return written
 
@@ -155,7 +158,7 @@ def write_frames(
 def _write_animation(poser: FramePoser, file: SplatFile, frames: range, path: Path, progress: Progress) -> None:
     def posed() -> Iterator[tuple[int, Splats]]:
         for done, kernels in _posed(poser, frames, progress):
-            yield frames[done], written_splats(file.splats, kernels, poser.edit)
+            yield frames[done], written_splats(file.splats, kernels, poser.edit, poser.surface)
             progress((done + 1) / len(frames))
 
     edit = poser.edit

@@ -12,6 +12,7 @@ from splap_editor.core.removal import PickedRows
 from splap_editor.core.splats.splats import Splats
 from splap_editor.core.timeline import Timeline
 from splap_editor.engine.edit import HANDLE_COLORS, Edit, Handle, Pin
+from splap_editor.engine.grading import Grading, grading_of
 from splap_editor.engine.removal import Removal, removal_of
 from splap_editor.io import plain_edit as plain
 from splap_editor.io.formats.table import FORMATS
@@ -32,6 +33,7 @@ def recipe_of(edit: Edit, *, with_disabled: bool = False) -> plain.Edit:
         method=edit.method,
         options=edit.options,
         remove=edit.removal.steps,
+        grade=edit.grading.steps,
         place=edit.place,
         camera=edit.timeline.camera_keys,
     )
@@ -47,9 +49,10 @@ def edit_of(recipe: plain.Edit, splats: Splats, find: Find | None = None, progre
     ------
     RecipeError
         A row is not in the file, nothing says which splats a handle or a pin is of, or there is no such quantity to
-        remove splats by.
+        remove or grade splats by.
     """
     regions = _regions(recipe, splats, progress)
+    removal = _removal(recipe, splats, find)
     handles = tuple(
         Handle(
             number,
@@ -70,7 +73,8 @@ def edit_of(recipe: plain.Edit, splats: Splats, find: Find | None = None, progre
         ),
         method=recipe.method,
         options=recipe.options,
-        removal=_removal(recipe, splats, find),
+        removal=removal,
+        grading=_grading(recipe, splats, removal, find),
         place=recipe.place,
         timeline=Timeline(camera_keys=recipe.camera),
     )
@@ -92,7 +96,7 @@ def require_rows_fit(recipe: plain.Edit, file: SplatFile) -> None:
     graph = recipe.options[GraphOptions]
     regions: list[plain.Handle | plain.Pin] = [*recipe.handles, *recipe.pins]
     names_rows = [spec.rows is not None for spec in regions] + [bool(graph.cut or graph.add)]
-    names_rows += [isinstance(step.picked, PickedRows) for step in recipe.remove]
+    names_rows += [isinstance(step.picked, PickedRows) for step in (*recipe.remove, *recipe.grade)]
     if not any(names_rows) or not (recipe.rows_of or FORMATS[file.format_name].reorders):
         return
     if recipe.rows_of != content_hash(file.path):
@@ -110,6 +114,13 @@ def rows_of(file: SplatFile) -> str:
 def _removal(recipe: plain.Edit, splats: Splats, find: Find | None) -> Removal:
     try:
         return removal_of(recipe.remove, splats, find)
+    except ValueError as error:
+        raise RecipeError(str(error)) from error
+
+
+def _grading(recipe: plain.Edit, splats: Splats, removal: Removal, find: Find | None) -> Grading:
+    try:
+        return grading_of(recipe.grade, splats, removal.mask, find)
     except ValueError as error:
         raise RecipeError(str(error)) from error
 

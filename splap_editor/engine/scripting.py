@@ -91,6 +91,7 @@ def deform(
         file,
         made.kernels,
         made.edit,
+        surface=made.surface,
         columns=columns,
         snapshot=made.snapshot if columns else None,
         as_3dgs=as_3dgs,
@@ -105,6 +106,7 @@ def write_posed(
     kernels: AdaptedKernels | None,
     edit: Edit,
     *,
+    surface: Surface | None = None,
     columns: Sequence[str] = (),
     snapshot: Snapshot | None = None,
     as_3dgs: bool = False,
@@ -120,7 +122,9 @@ def write_posed(
     kernels : AdaptedKernels or None
         None where everything is at rest.
     edit : Edit
-        Says which splats are left out, and where all others are put.
+        Says which splats are left out, how the others are graded, and where they are put.
+    surface : Surface, optional
+        Needed where a grade fades out along it.
     columns : sequence of str
         Quantities to write too.
     snapshot : Snapshot
@@ -135,7 +139,7 @@ def write_posed(
     if columns and snapshot is None:
         raise ValueError("columns need the snapshot that they are worked out from")
     stages("colour")
-    splats = written_splats(file.splats, kernels, edit)
+    splats = written_splats(file.splats, kernels, edit, surface)
     progress = stages("write")
     extra = columns_of(columns, snapshot) if snapshot is not None else {}
     write_splats(path, file, splats, removed=edit.removed, as_3dgs=as_3dgs, extra=extra, progress=progress)

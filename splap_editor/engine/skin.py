@@ -63,7 +63,8 @@ def write_skin(
             played = skin.blended(file.splats.means, number)
             farthest = max(farthest, float(np.linalg.norm(played - means, axis=1).max()))
         progress((number + 1) / len(frames))
-    write_skinned(path, file, skin, removed=bound.edit.removed)
+    graded = bound.edit.grading.graded(file.splats, bound.surface)
+    write_skinned(path, file, skin, splats=graded, removed=bound.edit.removed)
     return farthest
 
 

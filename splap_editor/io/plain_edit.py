@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from splap_editor.core.base_edit import BaseEdit
 from splap_editor.core.camera_path import CameraKey
+from splap_editor.core.grade import GradeStep
 from splap_editor.core.index_spaces import FileRow
 from splap_editor.core.options import Length
 from splap_editor.core.pose import Pose
@@ -90,15 +91,19 @@ class Edit(BaseEdit[Handle, Pin]):
         rows will do. Formats that put rows in an order of their own need it.
     remove : tuple of RemovalStep
         Splats that are left out of everything.
+    grade : tuple of GradeStep
+        Colour grades, one over the other.
     camera : tuple of CameraKey
         Where the camera stands at frames of a video, ascending; in the file's coordinates.
     """
 
     rows_of: str = ""
     remove: tuple[RemovalStep, ...] = ()
+    grade: tuple[GradeStep, ...] = ()
     camera: tuple[CameraKey, ...] = ()
 
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "remove", tuple(self.remove))
+        object.__setattr__(self, "grade", tuple(self.grade))
         object.__setattr__(self, "camera", tuple(self.camera))

@@ -18,6 +18,7 @@ from splap_editor.io.atomic_file import atomic_file
 from splap_editor.io.json_object import JsonObject, Look, json_lines, no_look, parsed_json, shown
 from splap_editor.io.plain_edit import Edit, Handle, Pin, Vector
 from splap_editor.io.recipe_camera import camera_from_json, camera_to_json
+from splap_editor.io.recipe_grade import grade_from_json, grade_to_json
 from splap_editor.io.recipe_removal import (
     PLACE_KEYS,
     place_from_json,
@@ -61,7 +62,7 @@ def recipe_groups() -> tuple[tuple[str, type], ...]:
 def recipe_keys() -> tuple[str, ...]:
     """Keys that a recipe may have."""
     keys = [key for key, group in recipe_groups() for key in ([key] if key else options_of(group))]
-    return ("version", "preset", "method", "rows_of", "handles", "pins", "remove", "place", "camera", *keys)
+    return ("version", "preset", "method", "rows_of", "handles", "pins", "remove", "grade", "place", "camera", *keys)
 
 
 class RecipeError(ValueError):
@@ -151,6 +152,7 @@ def recipe_from_json(value: Any, look: Look = no_look) -> Edit:
         options=OptionSet(*groups),
         rows_of=recipe.text("rows_of", ""),
         remove=removal_from_json(recipe, "remove"),
+        grade=grade_from_json(recipe, "grade"),
         place=place_from_json(recipe.object("place", PLACE_KEYS)),
         camera=camera_from_json(recipe, "camera"),
     )
@@ -225,6 +227,8 @@ def recipe_to_json(recipe: Edit) -> dict[str, Any]:
         _put(value, key, options)
     if recipe.remove:
         value["remove"] = removal_to_json(recipe.remove)
+    if recipe.grade:
+        value["grade"] = grade_to_json(recipe.grade)
     _put(value, "place", place_to_json(recipe.place))
     if recipe.camera:
         value["camera"] = camera_to_json(recipe.camera)

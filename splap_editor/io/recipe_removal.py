@@ -161,7 +161,8 @@ PICKED_KINDS = (
 )
 """Ways of picking splats beside by row; each replays on a capture that was trained anew."""
 
-_STEP_KEYS = ("rows", *(kind.key for kind in PICKED_KINDS), "outside", "restore")
+PICKED_KEYS = ("rows", *(kind.key for kind in PICKED_KINDS))
+_STEP_KEYS = (*PICKED_KEYS, "outside", "restore")
 
 
 def turn(held: JsonObject, key: str) -> tuple[float, float, float, float]:
@@ -184,16 +185,23 @@ def removal_from_json(recipe: JsonObject, key: str) -> tuple[RemovalStep, ...]:
 
 
 def _step(step: JsonObject) -> RemovalStep:
-    named = [key for key in _STEP_KEYS[:-2] if key in step]
-    if len(named) != 1:
-        raise step.wrong(f"must have one of the keys {', '.join(_STEP_KEYS[:-2])}")
-    if named == ["rows"]:
-        picked: Picked = PickedRows(np.unique(np.array(step.rows("rows"), np.int32)))
-    else:
-        kind = next(kind for kind in PICKED_KINDS if kind.key == named[0])
-        held = step.object(kind.key, tuple(kind.properties))
-        picked = kind.read(held)
+    picked = picked_from_json(step)
+    if picked is None:
+        raise step.wrong(f"must have one of the keys {', '.join(PICKED_KEYS)}")
     return RemovalStep(picked, step.flag("outside", False), step.flag("restore", False))
+
+
+def picked_from_json(step: JsonObject) -> Picked | None:
+    """Read the one way of picking splats that a step has; None where it has none."""
+    named = [key for key in PICKED_KEYS if key in step]
+    if not named:
+        return None
+    if len(named) > 1:
+        raise step.wrong(f"must have one of the keys {', '.join(PICKED_KEYS)}")
+    if named == ["rows"]:
+        return PickedRows(np.unique(np.array(step.rows("rows"), np.int32)))
+    kind = next(kind for kind in PICKED_KINDS if kind.key == named[0])
+    return kind.read(step.object(kind.key, tuple(kind.properties)))
 
 
 def removal_to_json(steps: tuple[RemovalStep, ...]) -> Any:
@@ -205,10 +213,15 @@ def removal_to_json(steps: tuple[RemovalStep, ...]) -> Any:
 def _said_step(step: RemovalStep) -> dict[str, Any]:
     flags = {"outside": step.outside, "restore": step.restores}
     said = {name: True for name, is_set in flags.items() if is_set}
-    if isinstance(step.picked, PickedRows):
-        return {"rows": np.asarray(step.picked.rows).tolist(), **said}
-    kind = next(kind for kind in PICKED_KINDS if isinstance(step.picked, kind.made))
-    return {kind.key: kind.said(step.picked), **said}
+    return {**picked_to_json(step.picked), **said}
+
+
+def picked_to_json(picked: Picked) -> dict[str, Any]:
+    """Plain objects of a way of picking splats."""
+    if isinstance(picked, PickedRows):
+        return {"rows": np.asarray(picked.rows).tolist()}
+    kind = next(kind for kind in PICKED_KINDS if isinstance(picked, kind.made))
+    return {kind.key: kind.said(picked)}
 
 
 def place_from_json(place: JsonObject) -> Place:
@@ -233,14 +246,12 @@ def place_to_json(place: Place) -> dict[str, Any]:
     }
 
 
-def removal_schema() -> dict[str, Any]:
-    """JSON Schema of the key ``remove``."""
-    rows = {
-        "type": "array",
-        "items": _ROW,
-        "minItems": 1,
-        "description": "File rows.",
-    }
+OUTSIDE = {"type": "boolean", "default": False, "description": "Everything else is meant."}
+
+
+def picked_properties() -> dict[str, Any]:
+    """JSON Schema of each way of picking splats, by key."""
+    rows = {"type": "array", "items": _ROW, "minItems": 1, "description": "File rows."}
     properties: dict[str, Any] = {"rows": rows}
     for kind in PICKED_KINDS:
         properties[kind.key] = {
@@ -250,11 +261,17 @@ def removal_schema() -> dict[str, Any]:
             "additionalProperties": False,
             "description": kind.sentence,
         }
+    return properties
+
+
+def removal_schema() -> dict[str, Any]:
+    """JSON Schema of the key ``remove``."""
+    properties = picked_properties()
     step = {
         "type": "object",
         "properties": {
             **properties,
-            "outside": {"type": "boolean", "default": False, "description": "Everything else is meant."},
+            "outside": OUTSIDE,
             "restore": {"type": "boolean", "default": False, "description": "Brought back rather than removed."},
         },
         "additionalProperties": False,

@@ -8,13 +8,14 @@ import math
 from typing import Any
 
 from splap_editor.core.deformers import method_titles
+from splap_editor.core.grade_options import GradeOptions
 from splap_editor.core.options import Option, ShareOfSize, options_of
 from splap_editor.core.pose import LARGEST_COORDINATE, SCALES
 from splap_editor.core.presets import PRESETS
 from splap_editor.core.reach_options import CageOptions
 from splap_editor.io.recipe import VERSION, recipe_groups
 from splap_editor.io.recipe_camera import camera_schema
-from splap_editor.io.recipe_removal import place_schema, removal_schema
+from splap_editor.io.recipe_removal import OUTSIDE, picked_properties, place_schema, removal_schema
 
 _ROW = {"type": "integer", "minimum": 0, "exclusiveMaximum": 2**31}
 _PAIR = {"type": "array", "items": _ROW, "minItems": 2, "maxItems": 2, "uniqueItems": True}
@@ -49,12 +50,26 @@ def recipe_schema() -> dict[str, Any]:
     for key, group in recipe_groups():
         options = {name: _option(known) for name, known in options_of(group).items()}
         properties.update({key: _object(options)} if key else options)
-    properties |= {"remove": removal_schema(), "place": place_schema(), "camera": camera_schema()}
+    properties |= {"remove": removal_schema(), "grade": grade_schema()}
+    properties |= {"place": place_schema(), "camera": camera_schema()}
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "SpLap recipe",
         "description": "An edit of a splat PLY: which splats are moved where, what stays, and how the rest follows.",
         **_object(properties, ["version"]),
+    }
+
+
+def grade_schema() -> dict[str, Any]:
+    """JSON Schema of the key ``grade``."""
+    picked = picked_properties()
+    options = {name: _option(known) for name, known in options_of(GradeOptions).items()}
+    of_some = [{"required": [key]} for key in picked]
+    of_all = {"not": {"anyOf": of_some}, "properties": {"outside": {"const": False}}}
+    step = {**_object({**picked, "outside": OUTSIDE, **options}), "oneOf": [of_all, *of_some]}
+    return {
+        "anyOf": [step, {"type": "array", "items": step}],
+        "description": "Colour grades, each over those before: of what is picked at rest, or of all splats.",
     }
 
 

@@ -241,9 +241,16 @@ def write_animation(
 
 
 def write_skinned(
-    path: str | os.PathLike[str], file: SplatFile, skin: "Skin", *, removed: FileMask | None = None
+    path: str | os.PathLike[str],
+    file: SplatFile,
+    skin: "Skin",
+    *,
+    splats: Splats | None = None,
+    removed: FileMask | None = None,
 ) -> None:
     """Write a file's splats at rest with an animation's skin as a ``.glb``, whole or not at all.
+
+    ``splats`` are written in the place of the file's own, as where they are graded.
 
     Raises
     ------
@@ -253,7 +260,7 @@ def write_skinned(
     from splap_editor.io.formats.gltf_skin import write
 
     kept = kept_rows(removed, file)
-    splats = file.splats
+    splats = file.splats if splats is None else splats
     if kept is not None:
         splats, skin = splats.at(kept), replace(skin, weights=skin.weights[kept])
     bare, _ = bare_splats(splats, FORMATS["gltf"].largest_degree)

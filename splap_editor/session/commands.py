@@ -41,7 +41,9 @@ class ChangeEdit:
         )
         removals = {id(edit.removal): edit.removal for edit in (self.before, self.after)}
         removed = sum(removal.nbytes for removal in removals.values()) if len(removals) > 1 else 0
-        return EDIT_BYTES + rows + removed
+        gradings = {id(edit.grading): edit.grading for edit in (self.before, self.after)}
+        graded = sum(grading.nbytes for grading in gradings.values()) if len(gradings) > 1 else 0
+        return EDIT_BYTES + rows + removed + graded
 
     def do(self) -> None:
         """Put the changed edit in place."""

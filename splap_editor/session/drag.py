@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from splap_editor.core.place import Place
 from splap_editor.core.pose import Pose
+from splap_editor.engine.grading import Grading
 from splap_editor.session.latest_job import Gate, LatestJob
 from splap_editor.session.stages import Ledger
 from splap_editor.session.undo_steps import UndoSteps
@@ -47,6 +48,11 @@ class Drag:
         """Show the whole scene put elsewhere, which is not in the history yet."""
         scene = self._ledger.shown_scene
         scene.set_preview(replace(scene.edit, place=place))
+
+    def preview_grading(self, grading: Grading) -> None:
+        """Show the splats graded otherwise, which is not in the history yet."""
+        scene = self._ledger.shown_scene
+        scene.set_preview(replace(scene.edit, grading=grading))
 
     def commit(self, label: str) -> None:
         """Make the previewed poses one undoable step, and settle."""

@@ -234,6 +234,7 @@ def exported_file(job: Job, request: ExportRequest) -> ExportReport:
         request.file,
         request.kernels,
         request.edit,
+        surface=request.snapshot.surface,
         columns=order.columns,
         snapshot=request.snapshot,
         as_3dgs=order.as_3dgs,

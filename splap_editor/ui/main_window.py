@@ -49,6 +49,7 @@ from splap_editor.ui.inspection import Inspection
 from splap_editor.ui.panels.deformer_panel import DeformerPanel
 from splap_editor.ui.panels.display_panel import DisplayPanel
 from splap_editor.ui.panels.floaters_panel import FloatersPanel
+from splap_editor.ui.panels.grade_panel import GradePanel
 from splap_editor.ui.panels.handles_panel import HandlesPanel
 from splap_editor.ui.panels.place_panel import PlacePanel
 from splap_editor.ui.panels.scene_panel import ScenePanel
@@ -278,6 +279,7 @@ class MainWindow(FileDrop, QMainWindow):
         self.handles_panel = HandlesPanel(self.session)
         self.deformer_panel = DeformerPanel(self.session)
         self.place_panel = PlacePanel(self.session, self.actions_)
+        self.grade_panel = GradePanel(self.session)
         floaters = self.tools.tools[FloatersTool.name]
         assert isinstance(floaters, FloatersTool)
         self.floaters_panel = FloatersPanel(floaters)
@@ -292,6 +294,7 @@ class MainWindow(FileDrop, QMainWindow):
             "Handles": self.handles_panel,
             "Deformer": self.deformer_panel,
             "Place": self.place_panel,
+            "Grade": self.grade_panel,
             "Floaters": self.floaters_panel,
             "Display": self.display_panel,
             **dict(self.inspection.panels),

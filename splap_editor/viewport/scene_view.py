@@ -1,7 +1,7 @@
 """A session shown in a viewport: it follows the scene's signals, and has colours and order made for each view."""
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 
 import numpy as np
@@ -15,6 +15,7 @@ from splap_editor.core.splats.rotations import quats_to_matrices
 from splap_editor.core.splats.spherical_harmonics import view_colors
 from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.edit import PIN_COLOR, Handle
+from splap_editor.engine.grading import Grading
 from splap_editor.session.depictor import HandOver
 from splap_editor.session.jobs import Job
 from splap_editor.session.latest_job import LatestJob
@@ -96,6 +97,14 @@ def depiction(splats: Splats) -> Depiction:
     return Depiction(rest, colors, contribution(rest, colors), sh0, shN)
 
 
+def graded_depiction(depicted: Depiction, splats: Splats) -> Depiction:
+    """Take the colours of graded splats; shapes and who gives most stay those of the file."""
+    has_view = splats.shN.shape[1] > 0
+    sh0 = np.ascontiguousarray(splats.sh0, np.float32) if has_view else depicted.sh0
+    shN = np.ascontiguousarray(splats.shN, np.float32) if has_view else depicted.shN
+    return replace(depicted, colors=base_colors(splats), sh0=sh0, shN=shN)
+
+
 def presented(depicted: Depiction, kernels: AdaptedKernels | None, seen: SeenFrom) -> Presented:
     """Sort and colour splats for a view; for the worker."""
     means = _rest_means(depicted) if kernels is None else kernels.means_f32
@@ -128,7 +137,9 @@ class SceneView:
         self.viewport = viewport
         self._session = session
         self._scene: Scene | None = None
+        self._of_file: Depiction | None = None
         self._depicted: Depiction | None = None
+        self._grades: tuple[Grading, object] = (Grading(), None)
         self._depicts: Splats | None = None
         self._presented: tuple[AdaptedKernels | None, Presented | None] = (None, None)
         self.preferred_up: tuple[float, float, float] | None = None
@@ -138,6 +149,7 @@ class SceneView:
         self._paints: dict[str, NDArray[np.uint8]] = {}
         self._marks: dict[str, tuple[tuple[FileRows, tuple[int, int, int, int]], ...]] = {}
         self._view_job = LatestJob(session.view_worker, "view")
+        self._grade_job = LatestJob(session.view_worker, "grade")
         self._is_dragged = False
         self._claim: Claim | None = None
         self._seen = SeenFrom(np.zeros(3), np.array([0.0, 0.0, -1.0], np.float32), False)
@@ -150,7 +162,7 @@ class SceneView:
             selection_changed=self._show_flags,
             hidden_changed=self._show_flags,
             removed_changed=self._show_removed,
-            surface_changed=self._show_subject,
+            surface_changed=self._on_surface_changed,
             edit_changed=self._show_edit,
             preview_changed=self._show_edit,
             up_changed=self._show_place,
@@ -166,6 +178,7 @@ class SceneView:
         self._session.prepare_for(None)
         self._scene = None
         self._view_job.drop()
+        self._grade_job.drop()
         self.viewport.close()
 
     @property
@@ -258,7 +271,8 @@ class SceneView:
         made = depiction(splats)
 
         def hand_over() -> None:
-            self._depicted, self._depicts = made, splats
+            self._of_file = self._depicted = made
+            self._depicts = splats
 
         return hand_over
 
@@ -282,10 +296,12 @@ class SceneView:
     def _on_scene_changed(self) -> None:
         self._scene = scene = self._session.shown_scene
         self._tinted_for, self._paints, self._marks = (), {}, {}
+        self._grade_job.drop()
+        self._grades = Grading(), None
         self.viewport.gizmo.detach()
         if self._depicts is not scene.splats:
             self.depict(scene.splats)()
-        depicted = self._depicted
+        depicted = self._depicted = self._of_file
         assert depicted is not None
         self.viewport.splats.load(depicted.rest, depicted.colors, scene.ellipses.subject, depicted.by_contribution)
         self.viewport.splats.set_subject(scene.ellipses.subject, scene.edit.removed)
@@ -295,6 +311,7 @@ class SceneView:
         self.viewport.reset_camera()
         self._show_flags()
         self._show_handles()
+        self._show_grades()
 
     @property
     def _shown(self) -> Scene | None:
@@ -339,7 +356,43 @@ class SceneView:
         if scene is not None:
             self.viewport.splats.set_subject(scene.ellipses.subject, scene.edit.removed)
 
+    def _on_surface_changed(self) -> None:
+        self._show_subject()
+        self._show_grades()
+
+    def _show_grades(self) -> None:
+        """Have the splats' colours graded as the edit says, and drawn once they are.
+
+        Only the newest of several waits, so that a slider that is dragged is followed as fast as it goes.
+        """
+        scene, of_file = self._shown, self._of_file
+        if scene is None or of_file is None:
+            return
+        grading = scene.shown_edit.grading
+        # A falloff goes along the surface; without one nothing changes with it.
+        surface = scene.surface if grading.needs_surface else None
+        before, along = self._grades
+        if surface is along and grading.like(before):
+            return
+        self._grades = grading, surface
+        splats = scene.splats
+
+        def graded(job: Job) -> Depiction:
+            shown = grading.graded_so_far(splats, surface)
+            return of_file if shown is splats else graded_depiction(of_file, shown)
+
+        def done(depicted: Depiction) -> None:
+            if self._shown is scene:
+                self._depicted = depicted
+                if not len(depicted.shN):
+                    self.viewport.splats.set_colors(depicted.colors)
+                self.viewport.splats.set_original_colors(None if depicted is of_file else of_file.colors)
+                self._ask_for_view()
+
+        self._grade_job.ask(graded, done)
+
     def _show_edit(self) -> None:
+        self._show_grades()
         self._show_place()
         self._show_handles()
 

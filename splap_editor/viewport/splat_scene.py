@@ -63,6 +63,7 @@ class SplatScene:
         self.deformed: SplatActor | None = None
         self.edges: EdgeLines | None = None
         self._original: SplatActor | None = None
+        self._original_colors: NDArray[np.uint8] | None = None
         self._rest: Glyphs | None = None
         self._subject_rows: FileRows = np.empty(0, np.int64)
         self._removed: FileMask | None = None
@@ -119,6 +120,7 @@ class SplatScene:
             if actor:
                 self._renderer.RemoveActor(actor.actor)
         self.deformed = self.edges = self._original = self._rest = self._seen = self._highlighted = None
+        self._original_colors = None
         self.request_render()
 
     @property
@@ -148,6 +150,12 @@ class SplatScene:
         """Overwrite colours and opacities (N, 4) of the deformed splats, as after a turn of the view."""
         self._loaded.set_colors(colors)
         self.request_render()
+
+    def set_original_colors(self, colors: NDArray[np.uint8] | None) -> None:
+        """Say which colours (N, 4) uint8 the original has; None: those that the deformed splats have."""
+        self._original_colors = colors
+        if self._original is not None and colors is not None:
+            self._original.set_colors(colors)
 
     def set_tints(self, tints: NDArray[np.uint8] | None) -> None:
         """Lay colours (N, 4) uint8, the fourth their share, over the deformed splats: handles, free and fixed."""
@@ -186,6 +194,11 @@ class SplatScene:
     def has_original(self) -> bool:
         """Whether there is the original to compare with, so that it wants an order too."""
         return self._original is not None
+
+    @property
+    def original(self) -> SplatActor | None:
+        """The splats at rest, once they have been compared with."""
+        return self._original
 
     def set_original_order(self, order: RowsByPlace) -> None:
         """Take a `depth_order` that the worker made for the original."""
@@ -232,7 +245,8 @@ class SplatScene:
         is_both = self._compare is Compare.BOTH
         if self._compare is not Compare.DEFORMED and self._original is None:
             shown = self.deformed
-            self._original = SplatActor(self._rest, shown.base_colors, shown.subject, shown.by_contribution)
+            colors = shown.base_colors if self._original_colors is None else self._original_colors
+            self._original = SplatActor(self._rest, colors, shown.subject, shown.by_contribution)
             self._original.set_subject(shown.subject, self._removed)
             self._original.set_flags(self._flags)
             # Blended actors are drawn in the order they were added: the ghost first, under the deformed splats.

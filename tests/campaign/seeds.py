@@ -109,6 +109,8 @@ def recipe(number: int) -> bytes:
         held["graph"] = {"neighborhood": names[0], "laplacian": names[1], "k": 5}
         held |= {"preset": "paper"} if number % 2 else {"blending": "linear", "adaptation": "paper"}
         held["remove"] = _removals(rng)[int(rng.integers(6))]
+        ball = {"sphere": {"center": [0, 0, 0], "radius": 0.5}, "outside": bool(rng.integers(2)), "falloff": 0.2}
+        held["grade"] = [{"exposure": 0.5, "contrast": 1.2, "opacity": 0.5}, {**ball, "hue": 90, "tint": -0.5}]
     return json.dumps(held).encode()
 
 

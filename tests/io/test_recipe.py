@@ -9,10 +9,13 @@ import pytest
 from splap_editor.core.adaptation.options import AdaptationOptions
 from splap_editor.core.arap.options import ArapOptions
 from splap_editor.core.bbw.options import BbwOptions
+from splap_editor.core.grade import GradeStep
+from splap_editor.core.grade_options import GradeOptions
 from splap_editor.core.graph.options import GraphOptions
 from splap_editor.core.options import OptionSet, ShareOfSize
 from splap_editor.core.pose import Pose
 from splap_editor.core.reach_options import CageOptions, ReachOptions
+from splap_editor.core.removal import PickedBall
 from splap_editor.io.recipe import (
     Edit,
     Handle,
@@ -55,6 +58,11 @@ def random_recipe(seed):
         return tuple(part / math.hypot(*quat) for part in quat)
 
     pairs = tuple((int(a), int(a + 1)) for a in rng.integers(0, 99, 3))
+    ball = PickedBall(vector(), float(rng.exponential()))
+    grades = (
+        GradeStep(GradeOptions(**maybe(exposure=0.1 / 3, hue=-20.0, opacity=0.0))),
+        GradeStep(GradeOptions(**maybe(contrast=0.1 / 3, falloff=2.0)), ball, bool(rng.integers(2))),
+    )
     return Edit(
         handles=tuple(
             Handle(
@@ -73,7 +81,7 @@ def random_recipe(seed):
             AdaptationOptions(**maybe(adaptation="affine", hops=3)),
             BbwOptions(**maybe(blending="linear")),
         ),
-        **maybe(method="bbw"),
+        **maybe(method="bbw", grade=grades),
     )
 
 

@@ -81,7 +81,7 @@ def submit_frames(
 
     def poser(job: Job) -> FramePoser:
         if serves and edit.active_handles:
-            return FramePoser(edit, bound)
+            return FramePoser(edit, bound, surface)
         return frame_poser(surface, edit, cache=cache, progress=job.progress("binding"), run=side_by_side(n_threads))
 
     said: list[str] = []
@@ -137,6 +137,7 @@ class _Desk:
         self.up = viewport.camera.up
         self._is_transparent = order.is_transparent
         self._splats, self._hidden, self._size = splats, scene.hidden, order.size
+        self._grading, self._surface = scene.edit.grading, scene.surface
         self._removed = scene.edit.removed
         self._look = viewport.splats.look
         shown = viewport.renderer
@@ -172,7 +173,8 @@ class _Desk:
 
     def _draw(self, kernels: AdaptedKernels | None, view: View) -> NDArray[np.uint8]:
         if self._studio is None:
-            self._studio = Studio(self._splats, self._look, *self._size, hidden=self._hidden, removed=self._removed)
+            splats = self._grading.graded_so_far(self._splats, self._surface)
+            self._studio = Studio(splats, self._look, *self._size, hidden=self._hidden, removed=self._removed)
             self._studio.viewport.set_background(*self._background)
         self._studio.pose(kernels)
         return self._studio.picture(view, is_transparent=self._is_transparent)
