@@ -1,6 +1,8 @@
-"""Grading a capture from the command line."""
+"""Grading captures, and putting several into one, from the command line."""
 
 import argparse
+import json
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from splap_editor.cleaning_cli import add_output_path, picked_box, read_input, tell_written, write_edited
@@ -25,6 +27,48 @@ def add_grade(parser: argparse.ArgumentParser) -> None:
     of.add_argument("--rows", type=int, nargs="+", metavar="ROW", help="only of these rows of the file")
     parser.add_argument("--outside", action="store_true", help="of all splats but these")
     parser.set_defaults(run=grade)
+
+
+def add_merge(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``splap-editor merge``."""
+    parser.add_argument("files", type=Path, nargs="+", metavar="IN", help="splat files of any formats, two or more")
+    parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT", help="its ending names the format")
+    parser.add_argument("--layout", help="make this of them: 3dgs, or a layout that all of them have")
+    parser.set_defaults(run=merge)
+
+
+def merge(options: argparse.Namespace) -> int:
+    """Write the rows of several files into one."""
+    from splap_editor.io.formats.table import format_to_write
+    from splap_editor.io.merging import merged_files
+    from splap_editor.io.splat_files import losses_of_saving, read_splats, write_splats
+
+    report = StageReport(quiet=options.quiet or options.json)
+    row = format_to_write(options.output)
+    files = []
+    for path in options.files:
+        with report(f"read {path.name}"):
+            files.append(read_splats(path, progress=report.progress))
+        for warning in files[-1].warnings:
+            report.say(f"note: {path.name}: {warning}")
+    with report("merge"):
+        merged = merged_files(files, layout=options.layout, progress=report.progress)
+    lost = losses_of_saving(merged.file, row)
+    for note in merged.notes:
+        report.say(f"note: {note}")
+    for loss in lost:
+        report.say(f"lost in {options.output.name}: {loss}")
+    with report("write"):
+        write_splats(options.output, merged.file, merged.file.splats, progress=report.progress)
+    n = merged.file.splats.n_splats
+    if options.json:
+        told = {"n_splats": n, "counts": merged.counts, "layout": merged.file.layout.name, "to": row.name}
+        told |= {"output": str(options.output), "notes": merged.notes, "losses": lost}
+        print(json.dumps({**told, "timings_s": report.timings_s}))
+    else:
+        parts = " + ".join(f"{count:,}" for count in merged.counts)
+        report.say(f"{options.output.name}: {n:,} splats ({parts}) as {merged.file.layout.name}, {row.title}")
+    return 0
 
 
 def grade(options: argparse.Namespace) -> int:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import splap_editor
-from splap_editor.arranging_cli import add_grade
+from splap_editor.arranging_cli import add_grade, add_merge
 from splap_editor.cleaning_cli import add_clean, add_place
 from splap_editor.core.graph.options import EDGE_OPTIONS, GraphOptions
 from splap_editor.core.options import options_of
@@ -91,6 +91,10 @@ def _parser() -> argparse.ArgumentParser:
     )
     _add_output(convert)
     convert.set_defaults(run=_convert)
+
+    merge = commands.add_parser("merge", help="write the rows of several files into one")
+    add_merge(merge)
+    _add_output(merge)
 
     turn = "draw a picture, the frames of an animation, or a turn all round"
     _add_render(commands.add_parser("render", help=turn))
@@ -341,7 +345,19 @@ def _graph(options: argparse.Namespace) -> int:
     return EXIT_OK
 
 
-_COMMANDS = ("edit", "deform", "convert", "clean", "place", "grade", "render", "info", "graph", *installation.NAMES)
+_COMMANDS = (
+    "edit",
+    "deform",
+    "convert",
+    "clean",
+    "place",
+    "grade",
+    "merge",
+    "render",
+    "info",
+    "graph",
+    *installation.NAMES,
+)
 
 
 def _readable(info: dict, indent: str = "") -> str:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.grade_options import GradeOptions
+from splap_editor.core.index_spaces import FileMask
 from splap_editor.core.removal import Picked
 from splap_editor.core.splats.splats import Splats
 
@@ -29,6 +30,10 @@ SH_C0 = 0.28209479177387814
 _BLOCK_ROWS = 1 << 14
 _LEAST_LOGIT = -20.0
 """Of what is made fully transparent: an opacity of 2e-9, and a number that every program reads."""
+
+
+Share = NDArray[np.floating] | FileMask
+"""(N,) to which share, in [0, 1], each splat is graded."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +85,7 @@ def _turn_about_grey(angle: float) -> NDArray[np.float64]:
     return np.eye(3) + np.sin(angle) * across + (1.0 - np.cos(angle)) * across @ across
 
 
-def graded_splats(splats: Splats, grades: Iterable[tuple[GradeOptions, NDArray[np.floating] | None]]) -> Splats:
+def graded_splats(splats: Splats, grades: Iterable[tuple[GradeOptions, Share | None]]) -> Splats:
     """Grade the colours and opacities of splats, one grade after the other.
 
     Parameters
@@ -122,7 +127,7 @@ def _changes_color(options: GradeOptions) -> bool:
 def _grade_colors(
     sh0: NDArray[np.floating],
     shN: NDArray[np.floating],
-    grades: list[tuple[tuple[NDArray[np.float64], NDArray[np.float64]], NDArray[np.floating] | None]],
+    grades: list[tuple[tuple[NDArray[np.float64], NDArray[np.float64]], Share | None]],
     first: int,
 ) -> None:
     """Grade the coefficients of some rows (n, 3) and (n, K, 3) from ``first`` on, in place; others stay as they are."""

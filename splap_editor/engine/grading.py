@@ -10,7 +10,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.grade import GradeStep, graded_splats
+from splap_editor.core.grade import GradeStep, Share, graded_splats
 from splap_editor.core.grade_options import GradeOptions
 from splap_editor.core.index_spaces import FileMask
 from splap_editor.core.removal import Finder as Find
@@ -112,7 +112,7 @@ class Grading:
         """The same for a picture: while there is no surface yet a falloff is left out."""
         return splats if self.is_identity else graded_splats(splats, self._shares(surface))
 
-    def _shares(self, surface: Surface | None) -> list[tuple[GradeOptions, NDArray[np.floating] | None]]:
+    def _shares(self, surface: Surface | None) -> list[tuple[GradeOptions, Share | None]]:
         return [
             (
                 step.options,
@@ -128,7 +128,7 @@ _SHARES: WeakKeyDictionary[Surface, tuple[tuple[FileMask, float, NDArray[np.floa
 _KEPT_SHARES = 8
 
 
-def faded_share(mask: FileMask, falloff: float, surface: Surface) -> NDArray[np.floating]:
+def faded_share(mask: FileMask, falloff: float, surface: Surface) -> Share:
     """Find the share to which each splat of a file is graded.
 
     Parameters

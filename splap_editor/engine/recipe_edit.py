@@ -96,7 +96,8 @@ def require_rows_fit(recipe: plain.Edit, file: SplatFile) -> None:
     graph = recipe.options[GraphOptions]
     regions: list[plain.Handle | plain.Pin] = [*recipe.handles, *recipe.pins]
     names_rows = [spec.rows is not None for spec in regions] + [bool(graph.cut or graph.add)]
-    names_rows += [isinstance(step.picked, PickedRows) for step in (*recipe.remove, *recipe.grade)]
+    picked = [*(step.picked for step in recipe.remove), *(step.picked for step in recipe.grade)]
+    names_rows += [isinstance(each, PickedRows) for each in picked]
     if not any(names_rows) or not (recipe.rows_of or FORMATS[file.format_name].reorders):
         return
     if recipe.rows_of != content_hash(file.path):
