@@ -26,6 +26,7 @@ from splap_editor.io.ply import read_ply
 from splap_editor.io.sample_maker import write_sample
 from splap_editor.resources import resource
 from splap_editor.session.edit_file import read_edit
+from splap_editor.ui.panels.section import bring_into_view
 from splap_editor.ui.theme import apply_theme
 from splap_editor.ui.viewport_widget import ask_of_qt
 from tests.benchmark.floaters import with_floaters
@@ -166,6 +167,26 @@ def clean_up_pictures(person: Person) -> None:
         person.picture("cleaned", only_view=True)
 
 
+def grade_picture(person: Person) -> None:
+    """Show a windmill with one sail graded, fading out along it, and the sliders that do it."""
+    window, session = person.window, person.session
+    path = resource("samples", "windmill_2dgs.ply")
+    session.open(path)
+    run_until(lambda: session.scene is not None and session.scene.file.path == path)
+    person.settle()
+    scene, panel = session.shown_scene, window.grade_panel
+    means, size = np.asarray(scene.splats.means, np.float64), scene.ellipses.scene_scale
+    scene.set_selection(np.linalg.norm(means - SAIL_TIP, axis=1) < 0.12 * size)
+    QTest.mouseClick(panel.add_selection, Qt.MouseButton.LeftButton)
+    for name, shown in (("exposure", 0.4), ("saturation", 300.0), ("hue", 160.0), ("falloff", 0.25 * size)):
+        panel.rows[name].field.setValue(shown)
+    scene.set_selection(np.zeros_like(scene.selection))
+    bring_into_view(panel)
+    window.overlay.show_hint()
+    person.settle()
+    person.picture("grade")
+
+
 def main() -> None:
     """Make every picture."""
     ask_of_qt()
@@ -201,6 +222,7 @@ def main() -> None:
     graph_pictures(person)
     weights_picture(person)
     clean_up_pictures(person)
+    grade_picture(person)
     sys.stdout.flush()
     os._exit(0)  # Qt and VTK tear down in no promised order; the pictures are written
 
