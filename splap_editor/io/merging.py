@@ -222,7 +222,9 @@ def _plain(file: SplatFile, n_scales: int, progress: Progress) -> tuple[Splats, 
     row = replace(FORMATS["ply"], name="3dgs", largest_degree=_LARGEST_DEGREE, log_scales=(THIN_LOG_SCALE, np.inf))
     bare, n_unusable = bare_splats(splats, _LARGEST_DEGREE, progress)
     if splats.filter_radii is not None or splats.thresholds is not None or file.layout.activated_opacity:
-        return bare, losses(file, splats, bare, n_unusable, row)
+        told = losses(file, splats, bare, n_unusable, row)
+        # Flat splats have no third scale to tell of where all stay flat.
+        return replace(bare, log_scales=bare.log_scales[:, :n_scales]), told
     if splats.n_scales == n_scales:
         # Shapes stay as they are, however thin.
         return splats, losses(file, bare, bare, 0, row)

@@ -105,6 +105,16 @@ def test_flat_splats_stay_flat_among_themselves_unless_another_layout_is_asked_f
     np.testing.assert_array_equal(thick.splats.log_scales[separated(merged, 1), :2], b.splats.log_scales)
 
 
+def test_flat_splats_with_a_filter_stay_flat_too(tmp_path):
+    filtered = columns(6, 1, normals=True, n_scales=2) | {"filter_3D": np.full(6, 0.01, "f4")}
+    a = read(tmp_path, "a.ply", ply_bytes(filtered))
+    b = read(tmp_path, "b.ply", ply_bytes(columns(6, 2, n_scales=2, rgb=True)))
+    assert a.splats.filter_radii is not None and a.splats.n_scales == b.splats.n_scales == 2
+    again, merged = written(tmp_path, a, b)
+    assert again.splats.n_scales == 2
+    np.testing.assert_allclose(again.splats.scales[separated(merged, 0)], a.splats.scales, rtol=1e-5)
+
+
 def test_three_files_of_text_bytes_and_packed_cells_go_together(tmp_path):
     held = columns(4, 5)
     text = read(tmp_path, "a.ply", ply_bytes(held, format_="ascii"))
