@@ -198,7 +198,7 @@ def arguments(given: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--seeds", type=int, default=3, help="objects a category (3)")
     parser.add_argument("--spacings", nargs="+", type=float, help="gap in splat spacings (4 2 1)")
     parser.add_argument("--regime", choices=sorted(STYLES), help="one regime for all objects")
-    parser.add_argument("--cells", type=int, metavar="N", help="pairs of regime and density an object (all of them)")
+    parser.add_argument("--cells", type=int, default=4, metavar="N", help="pairs of regime and density an object (4)")
     parser.add_argument("--pulls", type=int, default=3, help="handles an object (3)")
     parser.add_argument(
         "--method", default="", help="deformers: arap (ten plain iterations), settled, bbw (all, settled more seldom)"

@@ -89,7 +89,7 @@ def made_cases(options: argparse.Namespace) -> list[Case]:
     # Through all pairs before any comes again, whatever their number.
     stride = next(step for step in range(n_regimes + 1, 2 * len(cells) + 3) if gcd(step, len(cells)) == 1)
     cases = []
-    for turn in range(min(options.cells or len(cells), len(cells))):
+    for turn in range(min(options.cells, len(cells))):
         for seed in range(options.seeds):
             for category in options.categories:
                 first = seed + stride * list(CATEGORIES).index(category)

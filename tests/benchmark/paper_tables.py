@@ -1,5 +1,11 @@
-"""The comparison's rows as Markdown and JSON: a row a method, the paper's own figures beside it in italics."""
+"""The comparison's rows as Markdown and JSON: a row a method, the paper's own figures beside it in italics.
 
+Tables, plots and the README's table are made anew from the rows that a run has kept::
+
+    python -m tests.benchmark.paper_tables resources/evidence
+"""
+
+import argparse
 import json
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
@@ -9,10 +15,19 @@ from numpy.typing import NDArray
 
 from tests.benchmark.paper_methods import METHODS, NOT_RUN
 from tests.benchmark.paper_published import PUBLISHED, PUBLISHED_CATEGORIES
+from tests.benchmark.paper_rows import RowFile
+from tests.keys_table import with_block
 
 TITLES = {"arap": "ARAP, ten plain iterations", "settled": "ARAP, settled", "bbw": "BBW, cage 0.3 s"}
 RIVALS = ("paper", "knn10", "knn30")
 """What the editor must not be below in any category."""
+
+EVIDENCE = Path("resources/evidence")
+START, END = (
+    "<!-- evidence: python -m tests.benchmark.paper_tables resources/evidence -->\n",
+    "<!-- end of evidence -->\n",
+)
+"""What the README's table stands between."""
 
 Row = dict[str, object]
 Figures = NDArray[np.float64]
@@ -112,6 +127,33 @@ def markdown(rows: Sequence[Row]) -> str:
             parts += [_split_table(chosen, "regime", str), _below_line(chosen), ""]
     parts += [_neighbors_table(rows), _captures_table(rows)]
     return "\n".join(part for part in parts if part is not None).rstrip() + "\n"
+
+
+def readme_table(rows: Sequence[Row]) -> str:
+    """Means of every method over all scenes, by ARAP and by BBW, and the paper's own in italics."""
+    chosen = {solver: main_rows(rows, solver) for solver in ("arap", "bbw")}
+    head = ["method", *(f"{TITLES[solver]}: τ .05 .075 .1" for solver in chosen)]
+    lines = [_line(head), _line(["---"] * len(head))]
+    for name, method in METHODS.items():
+        cells = []
+        for solver, kept in chosen.items():
+            told = PUBLISHED.get((name, solver))
+            cells.append(_three(figures(kept, name)) + (f" · *{_three(told.averages)}*" if told else ""))
+        if any(row["candidate"] == name for kept in chosen.values() for row in kept):
+            lines.append(_line([method.title, *cells]))
+    said = [f"{TITLES[solver]}, {_runs(kept)}: {_below_line(kept)}" for solver, kept in chosen.items() if kept]
+    return "\n".join([*lines, "", *said]) + "\n"
+
+
+def with_readme_table(text: str, rows: Sequence[Row]) -> str:
+    """Put the table between the marks of a README."""
+    return with_block(text, START, readme_table(rows), END)
+
+
+def _runs(rows: Sequence[Row]) -> str:
+    commits = ", ".join(sorted({str(row["commit"]) for row in rows}))
+    n_categories = len({row["category"] for row in rows})
+    return f"{len({scene_of(row) for row in rows})} scenes of {n_categories} categories at {commits}"
 
 
 def _provenance(rows: Sequence[Row]) -> str:
@@ -221,7 +263,7 @@ def _plain(values: Figures) -> list[float]:
     return [round(float(value), 4) for value in values]
 
 
-def _three(values: Figures) -> str:
+def _three(values: Figures | Sequence[float]) -> str:
     return " ".join(map(_figure, values[:3]))
 
 
@@ -238,3 +280,19 @@ def _figure(value: float) -> str:
 
 def _line(cells: Iterable[str]) -> str:
     return f"| {' | '.join(cells)} |"
+
+
+def main(given: list[str] | None = None) -> None:
+    """Make tables, plots and the README's table from the rows of a folder."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path, help="where a run's rows are")
+    folder = parser.parse_args(given).folder
+    rows = RowFile(folder / "rows.jsonl").rows()
+    write_evidence(rows, folder)
+    if folder.resolve() == EVIDENCE.resolve():
+        readme = Path("README.md")
+        readme.write_text(with_readme_table(readme.read_text(encoding="utf-8"), rows), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
