@@ -225,8 +225,9 @@ def _deform(options: argparse.Namespace) -> int:
     row = format_to_write(options.output)
     columns = column_names(options.columns)
     held = read_edit_file(options)
-    file, lost = _read_to_write(options, row, report)
+    file = _read(options, report)
     edit = edit_for(held, file, report.say)
+    lost = _said_losses(options, file, row, report, is_edited=not edit.is_identity)
     cache = None if options.no_cache else StageCache(say=lambda text: report.say(f"note: {text}"))
     made = posed(file, edit, cache=cache, stages=report.stage, run=side_by_side(), with_surface=bool(columns))
     summary = write_posed(
@@ -262,20 +263,27 @@ def _deform(options: argparse.Namespace) -> int:
     return EXIT_OK
 
 
-def _read_to_write(
-    options: argparse.Namespace, row: "SplatFormat", report: StageReport
-) -> tuple["SplatFile", list[str]]:
-    """Read the file, and say what to know about it and what is lost in the format that it is to be written in."""
-    from splap_editor.io.splat_files import losses_of_saving, read_splats
+def _read(options: argparse.Namespace, report: StageReport) -> "SplatFile":
+    """Read the file, and say what to know about it."""
+    from splap_editor.io.splat_files import read_splats
 
     with report("read"):
         file = read_splats(options.file, layout=options.layout, progress=report.progress)
     for warning in file.warnings:
         report.say(f"note: {warning}")
-    lost = losses_of_saving(file, row, as_3dgs=options.as_3dgs)
+    return file
+
+
+def _said_losses(
+    options: argparse.Namespace, file: "SplatFile", row: "SplatFormat", report: StageReport, *, is_edited: bool
+) -> list[str]:
+    """Say what is lost in the format that a file is to be written in."""
+    from splap_editor.io.splat_files import losses_of_saving
+
+    lost = losses_of_saving(file, row, as_3dgs=options.as_3dgs, is_edited=is_edited)
     for loss in lost:
         report.say(f"lost in {options.output.name}: {loss}")
-    return file, lost
+    return lost
 
 
 def _convert(options: argparse.Namespace) -> int:
@@ -288,7 +296,8 @@ def _convert(options: argparse.Namespace) -> int:
             f"{options.output.name} ends in no known format. Choose a name with one of {endings_to_write()}."
         )
     row = format_to_write(options.output)
-    file, lost = _read_to_write(options, row, report)
+    file = _read(options, report)
+    lost = _said_losses(options, file, row, report, is_edited=False)
     with report("write"):
         write_splats(options.output, file, file.splats, as_3dgs=options.as_3dgs, progress=report.progress)
     if options.json:

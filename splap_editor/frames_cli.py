@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from splap_editor.io import plain_edit as plain
+from splap_editor.io.content_hash import has_content
 from splap_editor.io.png import write_png
 from splap_editor.io.recipe import read_recipe
-from splap_editor.io.session_file import content_hash, read_session_file
+from splap_editor.io.session_file import read_session_file
 from splap_editor.io.session_specs import SessionFile
 from splap_editor.io.video import is_video
 from splap_editor.stage_report import StageReport
@@ -48,7 +49,7 @@ def edit_for(held: plain.Edit | SessionFile | None, file: "SplatFile", say: Call
     if isinstance(held, plain.Edit):
         require_rows_fit(held, file)
         return edit_of(held, file.splats)
-    if held.ply.content_hash and content_hash(file.path) != held.ply.content_hash:
+    if held.ply.content_hash and not has_content(file.path, held.ply.content_hash):
         say(f"note: {file.path.name} is not the file that the session was saved with, or has changed since")
     return session_edit(held, file.splats)
 
@@ -69,7 +70,8 @@ def deform_frames(options: argparse.Namespace) -> int:
         raise ValueError("--frames needs keyframes: give a session saved by the editor with --session")
     frames = frame_range(options.frames, held.timeline.n_frames)
     file, poser = _prepared(options, held, report)
-    for loss in losses_of_saving(file, format_to_write(options.output), as_3dgs=options.as_3dgs):
+    row = format_to_write(options.output)
+    for loss in losses_of_saving(file, row, as_3dgs=options.as_3dgs, is_edited=True):
         report.say(f"lost in {options.output.name}: {loss}")
     with report("frames"):
         as_3dgs, said = options.as_3dgs, report.say

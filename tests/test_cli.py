@@ -262,6 +262,27 @@ def test_convert_says_what_is_lost_before_it_writes(ending, tmp_path, capsys):
     assert json.loads(capsys.readouterr().out)["n_splats"] == summary["n_splats"]
 
 
+def test_deform_says_first_that_an_edited_compressed_file_is_rounded_again(tmp_path, recipe, capsys):
+    packed, out = tmp_path / "packed.compressed.ply", tmp_path / "out.compressed.ply"
+    assert main(["convert", str(TUBE), "-o", str(packed), "--quiet"]) == 0
+    capsys.readouterr()
+    assert main(["deform", str(packed), "--recipe", str(recipe), "-o", str(out)]) == 0
+    said = capsys.readouterr().err
+    assert said.index("lost in out.compressed.ply: Numbers are rounded once more") < said.index("write")
+    recipe.write_text('{"version": 1}')
+    assert main(["deform", str(packed), "--recipe", str(recipe), "-o", str(out)]) == 0
+    assert "lost in" not in capsys.readouterr().err and out.read_bytes() == packed.read_bytes()
+
+
+@pytest.mark.parametrize("ending", ["ply", "spz", "glb"])
+def test_a_name_too_long_for_a_file_is_refused_in_a_sentence(ending, tmp_path, capsys):
+    name = tmp_path / f"{'a' * 300}.{ending}"
+    assert main(["info", str(name)]) == 2
+    assert "could not be read: File name too long" in capsys.readouterr().err
+    assert main(["convert", str(TUBE), "-o", str(name), "--quiet"]) == 2
+    assert "cannot be written: File name too long. Choose a shorter name" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(("name", "words"), [("out.xyz", "ends in no known format"), ("out.splat", "only read")])
 def test_convert_refuses_what_it_cannot_write(name, words, tmp_path, capsys):
     assert main(["convert", str(TUBE), "-o", str(tmp_path / name)]) == 2

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.pose import LARGEST_COORDINATE, SCALES, Pose
+from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.splats.rotations import matrices_to_quats, quat_products, quats_to_matrices
 from splap_editor.core.splats.splats import Splats
 
@@ -132,13 +133,15 @@ def stood_up(
     return place.followed_by(about(placed_points(np.asarray(center)[None], place)[0], turn=_turn_between(a, b)))
 
 
-def placed_splats(splats: Splats, place: Place) -> Splats:
+def placed_splats(splats: Splats, place: Place, progress: Progress = no_progress) -> Splats:
     """Move, turn and scale splats as one body, their view-dependent colour and their normals' axes with them.
 
     Parameters
     ----------
     splats : Splats
     place : Place
+    progress : Progress
+        Told the share done; may cancel.
 
     Returns
     -------
@@ -149,6 +152,7 @@ def placed_splats(splats: Splats, place: Place) -> Splats:
         return splats
     turns, grows = place.rotate != Place.rotate, place.scale != 1.0
     changed = replace(splats, means=placed_points(splats.means, place).astype(splats.means.dtype))
+    progress(0.1)
     if grows:
         radii = splats.filter_radii
         changed = replace(
@@ -161,6 +165,7 @@ def placed_splats(splats: Splats, place: Place) -> Splats:
     if turns:
         # A product of stored quaternions keeps their lengths.
         quats = quat_products(np.array([place.rotate]), np.asarray(splats.quats, np.float64))
+        progress(0.3)
         n = splats.n_splats
         shN = splats.shN
         if shN.shape[1]:
@@ -168,7 +173,7 @@ def placed_splats(splats: Splats, place: Place) -> Splats:
             from splap_editor.core.splats.spherical_harmonics import rotated_sh
 
             rotations = np.broadcast_to(place.rotation, (n, 3, 3))
-            shN = rotated_sh(shN, rotations, np.ones(n, bool)).astype(shN.dtype, copy=False)
+            shN = rotated_sh(shN, rotations, progress=part_of(progress, 0.3, 1.0)).astype(shN.dtype, copy=False)
         changed = replace(changed, quats=quats.astype(splats.quats.dtype), shN=shN)
     return changed
 

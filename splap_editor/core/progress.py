@@ -23,6 +23,15 @@ def part_of(progress: Progress, start: float, end: float) -> Progress:
     return lambda share: progress(start + (end - start) * share)
 
 
+FrameProgress = Callable[[int], Progress]
+"""Gives the progress callback of a frame by its place, from 0 on, and at their number that of what follows the last."""
+
+
+def no_frame_progress(place: int) -> Progress:
+    """Ignore the report of every frame."""
+    return no_progress
+
+
 StageProgress = Callable[[str], Progress]
 """Gives the progress callback of a stage, by its name or by words for it."""
 

@@ -19,7 +19,7 @@ from splap_editor.core.kept_arrays import Arrays
 from splap_editor.core.options import loaded, world_length
 from splap_editor.core.place import placed_splats
 from splap_editor.core.pose import Pose
-from splap_editor.core.progress import Progress, Runner, StageProgress, in_turn, no_progress, silent
+from splap_editor.core.progress import Progress, Runner, StageProgress, in_turn, no_progress, part_of, silent
 from splap_editor.core.reach_options import ReachOptions
 from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.cache import StageCache, content_key
@@ -258,10 +258,17 @@ def bound_file(
     return surface, bind(surface, edit, cache=cache, progress=stages("bind"), run=run)
 
 
-def written_splats(rest: Splats, kernels: AdaptedKernels | None, edit: Edit, surface: Surface | None = None) -> Splats:
+def written_splats(
+    rest: Splats,
+    kernels: AdaptedKernels | None,
+    edit: Edit,
+    surface: Surface | None = None,
+    progress: Progress = no_progress,
+) -> Splats:
     """Splats to write: as adapted, then graded, then in their place; ``surface`` is needed by a grade's falloff."""
-    splats = rest if kernels is None else adapted_splats(rest, kernels)
-    return placed_splats(edit.grading.graded(splats, surface), edit.place)
+    splats = rest if kernels is None else adapted_splats(rest, kernels, part_of(progress, 0.0, 0.5))
+    graded = edit.grading.graded(splats, surface)
+    return placed_splats(graded, edit.place, part_of(progress, 0.5, 1.0))
 
 
 def ready_for_drags(surface: Surface, cache: StageCache | None = None) -> None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
 from splap_editor.core.camera_path import CameraPose
-from splap_editor.core.progress import Progress, Runner, in_turn, no_progress, part_of
+from splap_editor.core.progress import Progress, Runner, StageProgress, in_turn, no_progress, part_of
 from splap_editor.core.splats.splats import Splats
 from splap_editor.core.timeline import LAST_FRAME
 from splap_editor.engine.bound_edit import BoundEdit, bind, written_splats
@@ -20,12 +20,15 @@ from splap_editor.engine.keyframes import edit_at_frame
 from splap_editor.engine.scripting import write_posed
 from splap_editor.engine.skin import camera_of, write_skin
 from splap_editor.engine.surface import Surface
-from splap_editor.io.formats.table import format_named, format_to_write
+from splap_editor.io.formats.table import format_named, format_to_write, stem_of
 from splap_editor.io.png import write_png
 from splap_editor.io.splat_files import SplatFile, write_animation
 from splap_editor.io.video import is_video, write_video
 
 Pixels = TypeVar("Pixels")
+_POSED, _TURNED = 0.6, 0.7
+"""Shares of a frame's work that are done once it is posed, and once its colours are turned; then it is written."""
+
 Draw = Callable[[AdaptedKernels | None, CameraPose | None], Pixels]
 
 
@@ -91,11 +94,8 @@ def frame_range(text: str, n_frames: int) -> range:
 
 def frame_path(path: Path, frame: int, last: int) -> Path:
     """``out.ply`` → ``out_0007.ply``, with as many digits as the last frame needs."""
-    named = format_named(path)
-    endings = (path.suffix,) if named is None else named.suffixes
     # "out.compressed.ply" has two endings that are one.
-    ending = next(each for each in endings if path.name.lower().endswith(each.lower()))
-    stem = path.name[: len(path.name) - len(ending)]
+    stem = stem_of(path)
     return path.with_name(f"{stem}_{frame:0{max(4, len(str(last)))}d}{path.name[len(stem) :]}")
 
 
@@ -150,25 +150,40 @@ def write_frames(
     for done, kernels in _posed(poser, frames, progress):
         frame = frames[done]
         written.append(frame_path(path, frame, frames[-1]))
-        write_posed(written[-1], file, kernels, poser.edit, surface=poser.surface, as_3dgs=as_3dgs)
+        told = part_of(progress, (done + _POSED) / len(frames), (done + 1) / len(frames))
+        stages = _two_halves(told)
+        write_posed(written[-1], file, kernels, poser.edit, surface=poser.surface, as_3dgs=as_3dgs, stages=stages)
         progress((done + 1) / len(frames))
     return written
 
 
 def _write_animation(poser: FramePoser, file: SplatFile, frames: range, path: Path, progress: Progress) -> None:
+    # What follows the last frame takes as long as one.
+    n_parts = len(frames) + 1
+
     def posed() -> Iterator[tuple[int, Splats]]:
-        for done, kernels in _posed(poser, frames, progress):
-            yield frames[done], written_splats(file.splats, kernels, poser.edit, poser.surface)
-            progress((done + 1) / len(frames))
+        for done, kernels in _posed(poser, frames, part_of(progress, 0.0, len(frames) / n_parts)):
+            turning = part_of(progress, (done + _POSED) / n_parts, (done + _TURNED) / n_parts)
+            yield frames[done], written_splats(file.splats, kernels, poser.edit, poser.surface, turning)
+
+    def encoding(place: int) -> Progress:
+        begun = _TURNED if place < len(frames) else 0.0
+        return part_of(progress, (place + begun) / n_parts, (place + 1) / n_parts)
 
     edit = poser.edit
     camera = camera_of(edit, frames)
-    write_animation(path, file, posed(), edit.timeline.fps, removed=edit.removed, camera=camera)
+    write_animation(path, file, posed(), edit.timeline.fps, removed=edit.removed, camera=camera, progress_of=encoding)
+
+
+def _two_halves(progress: Progress) -> StageProgress:
+    """Progress of turning colours, and of writing."""
+    halves = {"colour": part_of(progress, 0.0, 0.5), "write": part_of(progress, 0.5, 1.0)}
+    return halves.__getitem__
 
 
 def _write_skin(poser: FramePoser, file: SplatFile, frames: range, path: Path, progress: Progress) -> float:
-    def centers(frame: int) -> NDArray[np.floating] | None:
-        kernels = poser.kernels(frame)
+    def centers(frame: int, told: Progress) -> NDArray[np.floating] | None:
+        kernels = poser.kernels(frame, progress=told)
         return None if kernels is None else kernels.means
 
     return write_skin(path, file, poser.bound, frames, pose=centers, progress=progress)
@@ -226,4 +241,4 @@ def write_pictures(path: Path, pictures: Iterator[NDArray[np.uint8]], numbers: r
 def _posed(poser: FramePoser, frames: range, progress: Progress) -> Iterable[tuple[int, AdaptedKernels | None]]:
     n = len(frames)
     for done, frame in enumerate(frames):
-        yield done, poser.kernels(frame, progress=part_of(progress, done / n, (done + 0.9) / n))
+        yield done, poser.kernels(frame, progress=part_of(progress, done / n, (done + _POSED) / n))

@@ -15,10 +15,10 @@ from splap_editor.engine.edit import HANDLE_COLORS, Edit, Handle, Pin
 from splap_editor.engine.grading import Grading, grading_of
 from splap_editor.engine.removal import Removal, removal_of
 from splap_editor.io import plain_edit as plain
+from splap_editor.io.content_hash import content_hash, has_content
 from splap_editor.io.formats.table import FORMATS
 from splap_editor.io.plain_edit import Vector
 from splap_editor.io.recipe import RecipeError
-from splap_editor.io.session_file import content_hash
 from splap_editor.io.splat_files import SplatFile
 
 
@@ -100,7 +100,7 @@ def require_rows_fit(recipe: plain.Edit, file: SplatFile) -> None:
     names_rows += [isinstance(each, PickedRows) for each in picked]
     if not any(names_rows) or not (recipe.rows_of or FORMATS[file.format_name].reorders):
         return
-    if recipe.rows_of != content_hash(file.path):
+    if not has_content(file.path, recipe.rows_of):
         raise RecipeError(
             f"the edit names rows, and those of {file.path.name} stand in another order than in the file it was made "
             "for: use that file, or give handles and pins by center and radius"

@@ -138,8 +138,7 @@ def write_posed(
     """
     if columns and snapshot is None:
         raise ValueError("columns need the snapshot that they are worked out from")
-    stages("colour")
-    splats = written_splats(file.splats, kernels, edit, surface)
+    splats = written_splats(file.splats, kernels, edit, surface, stages("colour"))
     progress = stages("write")
     extra = columns_of(columns, snapshot) if snapshot is not None else {}
     write_splats(path, file, splats, removed=edit.removed, as_3dgs=as_3dgs, extra=extra, progress=progress)

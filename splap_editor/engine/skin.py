@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from splap_editor.core.camera_path import CameraTrack, camera_track
-from splap_editor.core.progress import Progress, no_progress
+from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.engine.bound_edit import BoundEdit
 from splap_editor.engine.edit import Edit
 from splap_editor.engine.keyframes import edit_at_frame
@@ -22,7 +22,7 @@ def write_skin(
     bound: BoundEdit | None,
     frames: range,
     *,
-    pose: Callable[[int], NDArray[np.floating] | None],
+    pose: Callable[[int, Progress], NDArray[np.floating] | None],
     progress: Progress = no_progress,
 ) -> float:
     """Write splats at rest with a skin that plays the frames.
@@ -35,9 +35,10 @@ def write_skin(
     bound : BoundEdit
         Bound with bounded biharmonic weights.
     frames : range
-    pose : callable (frame) → (N, 3) or None
+    pose : callable (frame, progress) → (N, 3) or None
         Centres of the splats as the deformer has them, to compare with.
     progress : Progress
+        Told several times a frame, and while the file is written; may cancel.
 
     Returns
     -------
@@ -56,15 +57,15 @@ def write_skin(
             "bounded biharmonic weights as the method, or write the frames as a .usdz."
         )
     skin = skin_of(file, bound, frames)
-    farthest = 0.0
+    farthest, n_parts = 0.0, len(frames) + 1
     for number, frame in enumerate(frames):
-        means = pose(frame)
+        means = pose(frame, part_of(progress, number / n_parts, (number + 0.7) / n_parts))
         if means is not None:
-            played = skin.blended(file.splats.means, number)
+            told = part_of(progress, (number + 0.7) / n_parts, (number + 1) / n_parts)
+            played = skin.blended(file.splats.means, number, told)
             farthest = max(farthest, float(np.linalg.norm(played - means, axis=1).max()))
-        progress((number + 1) / len(frames))
-    graded = bound.edit.grading.graded(file.splats, bound.surface)
-    write_skinned(path, file, skin, splats=graded, removed=bound.edit.removed)
+    graded, last = bound.edit.grading.graded(file.splats, bound.surface), part_of(progress, 1 - 1 / n_parts, 1.0)
+    write_skinned(path, file, skin, splats=graded, removed=bound.edit.removed, progress=last)
     return farthest
 
 

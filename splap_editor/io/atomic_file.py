@@ -14,6 +14,8 @@ from splap_editor.io.file_lock import FileLock, holds_lock
 
 _PART = re.compile(r"\..+\.[0-9a-f]{12}\.part")
 
+_WAYS_OUT = {errno.ENAMETOOLONG: "Choose a shorter name"}
+
 
 @contextlib.contextmanager
 def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
@@ -67,6 +69,11 @@ def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
             error.filename, error.filename2 = str(target), None
         raise
     _sync_directory(target.parent)
+
+
+def way_out(error: OSError) -> str:
+    """What to do where a file could not be written, as a sentence without its full stop."""
+    return _WAYS_OUT.get(error.errno or 0, "Free some space or choose another place")
 
 
 def _new_part(target: Path) -> tuple[int, Path]:

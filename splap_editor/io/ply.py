@@ -12,7 +12,7 @@ from splap_editor.core.index_spaces import FileMask
 from splap_editor.core.pose import LARGEST_COORDINATE
 from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.splats.splats import Splats
-from splap_editor.io.atomic_file import atomic_file
+from splap_editor.io.atomic_file import atomic_file, way_out
 from splap_editor.io.formats.bare_splats import THIN_LOG_SCALE, bare_splats
 from splap_editor.io.layout import COMMON_NAMES, SPLATS_SHARE, Layout, PlyEvidence
 from splap_editor.io.layouts import LAYOUTS, layout_of, require_splats
@@ -265,8 +265,7 @@ def _write_blocks(
         raise PlyError(f"{path} cannot be written: the directory {folder} does not exist. Create it.") from None
     except OSError as error:
         raise PlyError(
-            f"{path} cannot be written: {error.strerror or error}. Free some space or choose another place; "
-            "what was there is unchanged."
+            f"{path} cannot be written: {error.strerror or error}. {way_out(error)}; what was there is unchanged."
         ) from error
 
 

@@ -14,7 +14,7 @@ from splap_editor.core.pose import LARGEST_COORDINATE, SCALES, Pose
 from splap_editor.core.presets import PRESETS, with_preset
 from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.reach_options import CageOptions, ReachOptions
-from splap_editor.io.atomic_file import atomic_file
+from splap_editor.io.atomic_file import atomic_file, way_out
 from splap_editor.io.json_object import JsonObject, Look, json_lines, no_look, parsed_json, shown
 from splap_editor.io.plain_edit import Edit, Handle, Pin, Vector
 from splap_editor.io.recipe_camera import camera_from_json, camera_to_json
@@ -116,7 +116,7 @@ def write_recipe(path: str | os.PathLike[str], recipe: Edit) -> None:
         with atomic_file(path) as file:
             file.write(data)
     except OSError as error:
-        raise RecipeError(f"{path} cannot be written: {error.strerror or error}. Choose another place.") from error
+        raise RecipeError(f"{path} cannot be written: {error.strerror or error}. {way_out(error)}.") from error
 
 
 def recipe_from_json(value: Any, look: Look = no_look) -> Edit:

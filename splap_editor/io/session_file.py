@@ -2,7 +2,6 @@
 
 import base64
 import binascii
-import hashlib
 import math
 import os
 import re
@@ -14,10 +13,10 @@ import numpy as np
 from splap_editor.core.index_spaces import FileMask
 from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.timeline import LAST_FRAME, Key, Timeline
-from splap_editor.io.atomic_file import atomic_file
+from splap_editor.io.atomic_file import atomic_file, way_out
 from splap_editor.io.json_object import JsonObject, Look, json_lines, no_look, parsed_json, shown
 from splap_editor.io.recipe import RecipeError, pose_from_json, pose_to_json, recipe_from_json, recipe_to_json
-from splap_editor.io.regular_file import open_regular, regular_bytes
+from splap_editor.io.regular_file import regular_bytes
 from splap_editor.io.session_specs import (
     HandleSettings,
     PinSettings,
@@ -48,26 +47,10 @@ _KEYS = (
     "selection_sets",
     "document",
 )
-_HASH_CHUNK = 1 << 20
 
 
 class SessionFileError(ValueError):
     """A session file that cannot be read or written; the message is one sentence for the user."""
-
-
-def content_hash(path: str | os.PathLike[str], progress: Progress = no_progress) -> str:
-    """Hash of a file's bytes, ``"blake2b:…"``; the name and date do not count.
-
-    ``progress`` is told the share done for each MiB, and may cancel.
-    """
-    digest = hashlib.blake2b(digest_size=16)
-    with open_regular(path) as file:
-        n_bytes, done = os.fstat(file.fileno()).st_size, 0
-        while chunk := file.read(_HASH_CHUNK):
-            digest.update(chunk)
-            done += len(chunk)
-            progress(min(done / max(n_bytes, 1), 1.0))
-    return f"blake2b:{digest.hexdigest()}"
 
 
 def read_session_file(path: str | os.PathLike[str], progress: Progress = no_progress) -> SessionFile:
@@ -116,7 +99,7 @@ def write_session_file(path: str | os.PathLike[str], session: SessionFile) -> No
         with atomic_file(path) as file:
             file.write(data)
     except OSError as error:
-        raise SessionFileError(f"{path} cannot be written: {error.strerror or error}. Choose another place.") from error
+        raise SessionFileError(f"{path} cannot be written: {error.strerror or error}. {way_out(error)}.") from error
 
 
 def relative_path(path: Path, folder: Path) -> str:

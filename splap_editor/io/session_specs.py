@@ -22,7 +22,7 @@ class PlySpec:
     path : str
         Relative to the folder of the session file, with forward slashes; absolute where there is no such way.
     content_hash : str
-        As `splap_editor.io.session_file.content_hash` gives it; empty where it was not known.
+        As `splap_editor.io.content_hash.content_hash` gives it; empty where it was not known.
     n_splats : int
     layout : str, optional
         Layout chosen by hand.

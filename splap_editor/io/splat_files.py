@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 
 from splap_editor.core.camera_path import CameraTrack
 from splap_editor.core.index_spaces import FileMask
-from splap_editor.core.progress import Progress, no_progress, part_of
+from splap_editor.core.progress import FrameProgress, Progress, no_frame_progress, no_progress, part_of
 from splap_editor.core.splats.splats import Splats
-from splap_editor.io.atomic_file import atomic_file
+from splap_editor.io.atomic_file import atomic_file, way_out
 from splap_editor.io.formats.bare_splats import bare_splats
 from splap_editor.io.formats.losses import losses
 from splap_editor.io.formats.source import FormatError, Source
@@ -20,6 +20,7 @@ from splap_editor.io.formats.table import FORMATS, GLANCE, SplatFormat, format_o
 from splap_editor.io.layout import PlyEvidence
 from splap_editor.io.layouts import LAYOUTS, layout_of
 from splap_editor.io.ply import SplatFile, kept_rows, read_ply, splat_file, write_ply
+from splap_editor.io.splat_cells import any_stored_difference
 
 if TYPE_CHECKING:
     from splap_editor.io.formats.gltf_skin import Skin
@@ -89,7 +90,11 @@ def read_splats(
 def file_meant(path: Path) -> Path:
     """The file to read of a path: of a folder the one that names its others, if it holds one."""
     held = path / "meta.json"
-    return held if held.is_file() else path
+    try:
+        return held if held.is_file() else path
+    except OSError:
+        # A name too long for any file; whoever opens it says so.
+        return path
 
 
 def are_splats(path: Path) -> bool:
@@ -108,6 +113,7 @@ def losses_of_saving(
     splats: Splats | None = None,
     *,
     as_3dgs: bool = False,
+    is_edited: bool = False,
     progress: Progress = no_progress,
 ) -> list[str]:
     """Say what saving a file's splats in a format loses, each as a sentence.
@@ -120,22 +126,29 @@ def losses_of_saving(
         The file's splats, deformed.
     as_3dgs : bool
         As of `write_splats`.
+    is_edited : bool
+        Some splats are to be moved or left out. A compressed PLY that is saved as one is copied otherwise.
     progress : Progress
         May cancel.
     """
     if row.is_lossless and as_3dgs and file.is_misread and file.splats.n_scales == 3:
         row = replace(row, name="3dgs", largest_degree=3)
-    if row.is_lossless or _is_kept(file, row):
+    is_kept = _is_kept(file, row)
+    if row.is_lossless or (is_kept and not is_edited):
         return []
     splats = file.splats if splats is None else splats
     bare, n_unusable = bare_splats(splats, row.largest_degree, progress)
-    return losses(file, splats, bare, n_unusable, row)
+    return losses(file, splats, bare, n_unusable, row, is_kept=is_kept)
 
 
 def losses_by_format(file: SplatFile) -> dict[str, list[str]]:
     """What saving a file's splats would lose in each format but PLY, by the format's usual ending."""
     rows = [row for row in FORMATS.values() if row.can_be_written and not row.is_lossless]
-    return {row.suffixes[0]: losses_of_saving(file, row) for row in rows}
+    found = {row.suffixes[0]: losses_of_saving(file, row, is_edited=_is_kept(file, row)) for row in rows}
+    for row in rows:
+        if _is_kept(file, row):
+            found[row.suffixes[0]] = [f"Only if it is edited: {loss}" for loss in found[row.suffixes[0]]]
+    return found
 
 
 def name_filter(*, to_write: bool = False) -> str:
@@ -177,12 +190,13 @@ def write_splats(
     """
     path = Path(path)
     row = format_to_write(path)
-    if row.is_lossless or (_is_kept(file, row) and splats is file.splats and removed is None and not extra):
+    kept = kept_rows(removed, file)
+    is_copy = _is_kept(file, row) and kept is None and not any_stored_difference(file.splats, splats)
+    if row.is_lossless or (is_copy and not extra):
         write_ply(path, file, splats, removed=removed, as_3dgs=as_3dgs, extra=extra, progress=progress)
         return
     if extra:
         raise FormatError(f"{path.name} cannot hold the columns {', '.join(extra)}. Save them in a PLY.")
-    kept = kept_rows(removed, file)
     kept_splats = splats if kept is None else splats.at(kept)
     bare, _ = bare_splats(kept_splats, row.largest_degree, part_of(progress, 0.0, 0.1))
     encoding = part_of(progress, 0.1, 1.0)
@@ -207,6 +221,7 @@ def write_animation(
     *,
     removed: FileMask | None = None,
     camera: CameraTrack | None = None,
+    progress_of: FrameProgress = no_frame_progress,
 ) -> None:
     """Write the frames of an animation to one file, whole or not at all.
 
@@ -224,6 +239,8 @@ def write_animation(
         As of `write_splats`.
     camera : CameraTrack, optional
         At each frame.
+    progress_of : FrameProgress
+        May cancel.
 
     Raises
     ------
@@ -234,10 +251,14 @@ def write_animation(
     kept = kept_rows(removed, file)
 
     def bared() -> Iterator[tuple[int, Splats]]:
-        for number, splats in frames:
-            yield number, bare_splats(splats if kept is None else splats.at(kept), row.largest_degree)[0]
+        for place, (number, splats) in enumerate(frames):
+            told = part_of(progress_of(place), 0.0, 0.2)
+            yield number, bare_splats(splats if kept is None else splats.at(kept), row.largest_degree, told)[0]
 
-    _write_whole(Path(path), lambda out: row.write_frames(out, bared(), rate, camera))
+    def encoding(place: int) -> Progress:
+        return part_of(progress_of(place), 0.2, 1.0)
+
+    _write_whole(Path(path), lambda out: row.write_frames(out, bared(), rate, camera, encoding))
 
 
 def write_skinned(
@@ -247,10 +268,11 @@ def write_skinned(
     *,
     splats: Splats | None = None,
     removed: FileMask | None = None,
+    progress: Progress = no_progress,
 ) -> None:
     """Write a file's splats at rest with an animation's skin as a ``.glb``, whole or not at all.
 
-    ``splats`` are written in the place of the file's own, as where they are graded.
+    ``splats`` are written in the place of the file's own, as where they are graded; ``progress`` may cancel.
 
     Raises
     ------
@@ -263,8 +285,8 @@ def write_skinned(
     splats = file.splats if splats is None else splats
     if kept is not None:
         splats, skin = splats.at(kept), replace(skin, weights=skin.weights[kept])
-    bare, _ = bare_splats(splats, FORMATS["gltf"].largest_degree)
-    _write_whole(Path(path), lambda out: write(out, bare, skin))
+    bare, _ = bare_splats(splats, FORMATS["gltf"].largest_degree, part_of(progress, 0.0, 0.1))
+    _write_whole(Path(path), lambda out: write(out, bare, skin, part_of(progress, 0.1, 1.0)))
 
 
 def _is_kept(file: SplatFile, row: SplatFormat) -> bool:
@@ -282,6 +304,5 @@ def _write_whole(path: Path, encoded: Callable[[BinaryIO], None]) -> None:
         raise FormatError(f"{path} cannot be written: the directory {folder} does not exist. Create it.") from None
     except OSError as error:
         raise FormatError(
-            f"{path} cannot be written: {error.strerror or error}. Free some space or choose another place; "
-            "what was there is unchanged."
+            f"{path} cannot be written: {error.strerror or error}. {way_out(error)}; what was there is unchanged."
         ) from error

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from splap_editor.core.progress import Progress, no_progress
 from splap_editor.engine.removal import Finder
-from splap_editor.io.session_file import content_hash, read_session_file, write_session_file
+from splap_editor.io.content_hash import content_hash, has_content
+from splap_editor.io.session_file import read_session_file, write_session_file
 from splap_editor.io.session_specs import SessionFile
 from splap_editor.session.jobs import Job, Post, Starter, Worker, close_all
 from splap_editor.session.latest_job import LatestJob
@@ -252,6 +253,6 @@ def _located(arrival: _Arrival, folder: Path, ply: Path | None, progress: Progre
     source = next((place for place in places if place.is_file()), None)
     if source is None:
         raise MissingPlyError(arrival.document, arrival.session)
-    if spec.content_hash and content_hash(source, progress) != spec.content_hash:
+    if spec.content_hash and not has_content(source, spec.content_hash, progress):
         arrival.notes.append(f"{source.name} has changed since this was saved; the edit may not fit it any more.")
     return Path(os.path.abspath(source))

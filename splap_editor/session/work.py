@@ -10,7 +10,7 @@ from pathlib import Path
 from splap_editor.core.adaptation.kernel_adaptation import AdaptedKernels
 from splap_editor.core.deformer import Deformation
 from splap_editor.core.graph.splat_graph import GraphOptions
-from splap_editor.core.progress import Progress
+from splap_editor.core.progress import Progress, part_of
 from splap_editor.core.splats.occupancy import Ellipses, occupancy_ellipses
 from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.bound_edit import BoundEdit, Posed, bind, ready_for_drags
@@ -227,7 +227,7 @@ def exported_file(job: Job, request: ExportRequest) -> ExportReport:
     def stages(stage: str) -> Progress:
         told = job.progress(EXPORT_WORDS[stage])
         told(0.1)
-        return told
+        return part_of(told, 0.1, 1.0)
 
     return write_posed(
         order.path,

@@ -54,6 +54,14 @@ def test_each_frame_is_a_file_with_what_it_shows(poser, file, tmp_path):
     assert shares == sorted(shares) and shares[-1] == 1.0
 
 
+def test_within_a_frame_it_is_told_how_far_its_file_is(poser, file, tmp_path):
+    for name in ("out.ply", "out.spz", "out.usdc"):
+        shares = []
+        write_frames(poser, file, range(8, 10), tmp_path / name, progress=shares.append)
+        assert shares == sorted(shares) and shares[-1] == 1.0
+        assert len({share for share in shares if 0.3 < share < 0.5}) >= 3, name
+
+
 def test_cancelling_keeps_the_frames_that_are_whole(poser, file, tmp_path):
     def cancel(share):
         if share > 0.5:

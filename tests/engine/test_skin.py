@@ -13,6 +13,7 @@ from splap_editor.core.bbw.options import BbwOptions
 from splap_editor.core.camera_path import CameraPose
 from splap_editor.core.options import OptionSet
 from splap_editor.core.place import Place
+from splap_editor.core.progress import Cancelled
 from splap_editor.core.reach_options import ReachOptions
 from splap_editor.core.splats.rotations import quats_to_matrices
 from splap_editor.engine.edit import Edit, Handle, Pose
@@ -141,6 +142,24 @@ def test_a_player_puts_every_splat_where_the_deformer_does(tmp_path, file, surfa
         played = player.positions((frame - 1) / edit.timeline.fps) * [-1, -1, 1]
         assert np.abs(played - expected).max() < 1e-4 * surface.scene_scale, frame
     assert len(said) == 1 and "linear blending" in said[0]
+
+
+def test_a_skin_tells_how_far_it_is_within_a_frame_and_stops_anywhere(tmp_path, file, surface):
+    poser, shares = frame_poser(surface, edit_of(surface)), []
+    write_frames(poser, file, range(1, 3), tmp_path / "out.glb", progress=shares.append)
+    assert shares == sorted(shares) and shares[-1] == 1.0
+    # Two frames, and then the file.
+    assert all(any(third / 3 < share < (third + 1) / 3 for share in shares) for third in range(3))
+    (tmp_path / "out.glb").unlink()
+    for stop in (shares[1], 0.9, shares[-2]):
+
+        def cancel(share, stop=stop):
+            if share >= stop:
+                raise Cancelled
+
+        with pytest.raises(Cancelled):
+            write_frames(poser, file, range(1, 3), tmp_path / "out.glb", progress=cancel)
+        assert not list(tmp_path.glob("*out*"))
 
 
 def test_what_a_skin_cannot_play_is_measured(tmp_path, file, surface):

@@ -13,8 +13,9 @@ import pytest
 import splap_editor
 from splap_editor.core.progress import Cancelled
 from splap_editor.engine.cache import HEAD, MAGIC
+from splap_editor.io.content_hash import content_hash
 from splap_editor.io.ply import PlyError, read_ply
-from splap_editor.io.session_file import content_hash, read_session_file
+from splap_editor.io.session_file import read_session_file
 from splap_editor.io.splat_files import read_splats, write_splats
 from splap_editor.io.thresholds import read_thresholds
 from tests.campaign.seeds import ksplat_bytes, splat_records

@@ -5,10 +5,11 @@ import socket
 
 import pytest
 
+from splap_editor.io.content_hash import content_hash
 from splap_editor.io.ply import PlyError, read_ply
 from splap_editor.io.recipe import RecipeError, read_recipe
 from splap_editor.io.regular_file import MOST_TEXT_BYTES, open_regular, regular_bytes
-from splap_editor.io.session_file import SessionFileError, content_hash, read_session_file
+from splap_editor.io.session_file import SessionFileError, read_session_file
 
 READERS = [(read_recipe, RecipeError), (read_session_file, SessionFileError), (read_ply, PlyError)]
 

@@ -14,7 +14,6 @@ from splap_editor.core.timeline import Key, Timeline
 from splap_editor.io.recipe import Edit, Handle, Pin
 from splap_editor.io.session_file import (
     SessionFileError,
-    content_hash,
     read_session_file,
     relative_path,
     session_from_json,
@@ -217,12 +216,6 @@ def test_a_session_that_could_not_be_read_again_is_not_written(tmp_path):
 def test_a_folder_that_is_not_there_is_said(tmp_path):
     with pytest.raises(SessionFileError, match="cannot be written"):
         write_session_file(tmp_path / "no" / "a.splap", SessionFile(PlySpec("a.ply", "", 1)))
-
-
-def test_the_hash_is_that_of_the_bytes(tmp_path):
-    for name, data in (("a", b"1" * (1 << 20) + b"2"), ("b", b"1" * (1 << 20) + b"2"), ("c", b"1" * (1 << 20) + b"3")):
-        (tmp_path / name).write_bytes(data)
-    assert content_hash(tmp_path / "a") == content_hash(tmp_path / "b") != content_hash(tmp_path / "c")
 
 
 def test_the_way_to_a_neighbour_is_its_name(tmp_path):

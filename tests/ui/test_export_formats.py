@@ -11,9 +11,10 @@ from PySide6.QtWidgets import QApplication, QFileDialog, QWidget
 from shiboken6 import isValid
 
 from splap_editor.app import Mailbox
+from splap_editor.core.place import Place
 from splap_editor.core.splats.occupancy import occupancy_ellipses
 from splap_editor.core.timeline import Timeline
-from splap_editor.io.splat_files import losses_of_saving, read_splats
+from splap_editor.io.splat_files import losses_of_saving, read_splats, write_splats
 from splap_editor.resources import resource
 from splap_editor.session.jobs import Job, Worker
 from splap_editor.session.scene import Scene
@@ -168,6 +169,28 @@ def test_nothing_is_saved_before_it_is_said_what_that_loses_and_only_the_format_
     qtbot.waitUntil(dialog.accept_button.isEnabled, timeout=WAIT_MS)
     assert "Numbers are rounded" in dialog.choice.losses.text()
     assert worked_out == ["spz"]
+
+
+@pytest.mark.parametrize("is_edited", [False, True])
+def test_an_edited_compressed_file_says_what_saving_it_compressed_loses(qtbot, tmp_path, flat_file, worker, is_edited):
+    write_splats(tmp_path / "held.compressed.ply", flat_file, flat_file.splats)
+    file = read_splats(tmp_path / "held.compressed.ply")
+    scene = Scene(file, occupancy_ellipses(file.splats))
+    if is_edited:
+        scene.edit = replace(scene.edit, place=Place(translate=(1.0, 0.0, 0.0)))
+    dialog = ExportDialog(None, tmp_path / "out.ply", scene, {}, worker)
+    dialog.show()
+    assert ("no longer compressed" in dialog.choice.facts.text()) == is_edited
+    choose(dialog.choice, "compressed-ply")
+    wait_told(qtbot, dialog.choice)
+    assert dialog.choice.losses.text().startswith("Lost: Numbers are rounded once more" if is_edited else "")
+    assert dialog.choice.losses.isVisible() == is_edited
+    dialog.reject()
+
+
+def test_a_name_too_long_for_a_file_is_said(dialog, tmp_path):
+    dialog.path_field.setText(str(tmp_path / ("a" * 300 + ".spz")))
+    assert "too long" in dialog.note.text() and not dialog.accept_button.isEnabled()
 
 
 def test_losses_that_cannot_be_told_keep_nobody_from_saving(dialog, qtbot, monkeypatch):

@@ -11,6 +11,7 @@ from splap_editor.core.adaptation.kernel_binding import KernelBinding
 from splap_editor.core.adaptation.node_motions import STILL_SHARE, find_motions, find_moved, find_ring_motions
 from splap_editor.core.adaptation.options import AdaptationOptions
 from splap_editor.core.deformer import Deformation
+from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.splats.rotations import matrices_to_quats, quat_products
 from splap_editor.core.splats.spherical_harmonics import rotated_sh
 from splap_editor.core.splats.splats import Splats
@@ -225,7 +226,7 @@ def _carrier_motions(
     return carriers, weights, motions, square_shifts
 
 
-def adapted_splats(splats: Splats, adapted: AdaptedKernels) -> Splats:
+def adapted_splats(splats: Splats, adapted: AdaptedKernels, progress: Progress = no_progress) -> Splats:
     """Splats to write to a file: those of the scene, with the changed rows replaced.
 
     Parameters
@@ -234,6 +235,8 @@ def adapted_splats(splats: Splats, adapted: AdaptedKernels) -> Splats:
         The scene that was bound.
     adapted : AdaptedKernels
         Its adapted kernels.
+    progress : Progress
+        Told the share done; may cancel.
 
     Returns
     -------
@@ -255,13 +258,18 @@ def adapted_splats(splats: Splats, adapted: AdaptedKernels) -> Splats:
         result[changed] = new[changed]
         return result
 
+    means = replaced(splats.means, adapted.means)
+    log_scales = replaced(splats.log_scales, adapted.log_scales)
+    progress(0.1)
+    quats = replaced(splats.quats, adapted.quats)
+    shN = rotated_sh(splats.shN, adapted.rotations, changed, part_of(progress, 0.2, 1.0))
     return Splats(
-        means=replaced(splats.means, adapted.means),
-        log_scales=replaced(splats.log_scales, adapted.log_scales),
-        quats=replaced(splats.quats, adapted.quats),
+        means=means,
+        log_scales=log_scales,
+        quats=quats,
         logit_opacities=splats.logit_opacities,
         sh0=splats.sh0,
-        shN=rotated_sh(splats.shN, adapted.rotations, changed).astype(splats.shN.dtype, copy=False),
+        shN=shN.astype(splats.shN.dtype, copy=False),
         thresholds=splats.thresholds,
         filter_radii=splats.filter_radii,
         normal_axis=splats.normal_axis,

@@ -4,6 +4,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.progress import Progress, no_progress
 from splap_editor.core.twofold_loop import TwofoldLoop
 
 SH_C0 = 0.28209479177387814
@@ -25,6 +26,9 @@ _DIRECTIONS = np.array(
     ]
 )
 _DIRECTIONS /= np.linalg.norm(_DIRECTIONS, axis=1, keepdims=True)
+
+_BLOCK_ROWS = 1 << 16
+"""Rows that are turned between two words of progress."""
 
 
 @nb.njit(inline="always")
@@ -170,7 +174,10 @@ def view_colors(
 
 
 def rotated_sh(
-    shN: NDArray[np.floating], rotations: NDArray[np.floating], changed: NDArray[np.bool_] | None = None
+    shN: NDArray[np.floating],
+    rotations: NDArray[np.floating],
+    changed: NDArray[np.bool_] | None = None,
+    progress: Progress = no_progress,
 ) -> NDArray[np.floating]:
     """Turn the view-dependent colour of splats with the splats.
 
@@ -186,6 +193,8 @@ def rotated_sh(
         Proper rotations, rest → deformed.
     changed : (N,) bool, optional
         Rows to turn; None turns all. Rows whose rotation is exactly the identity are copied bit for bit either way.
+    progress : Progress
+        Told the share of rows done; may cancel.
 
     Returns
     -------
@@ -201,11 +210,16 @@ def rotated_sh(
     degree = _degree(shN)
     if np.shape(rotations) != (len(shN), 3, 3):
         raise ValueError(f"rotations must have shape ({len(shN)}, 3, 3), got {np.shape(rotations)}")
-    turned: NDArray[np.floating] = np.array(shN, np.float32 if shN.dtype.itemsize <= 4 else np.float64, order="C")
-    if degree:
-        if changed is None:
-            changed = np.ones(len(shN), np.bool_)
-        _rotate_sh(turned, np.ascontiguousarray(rotations, np.float64), np.ascontiguousarray(changed), degree)
+    turned: NDArray[np.floating] = np.empty(np.shape(shN), np.float32 if shN.dtype.itemsize <= 4 else np.float64)
+    if changed is None:
+        changed = np.ones(len(shN), np.bool_)
+    for lo in range(0, len(shN), _BLOCK_ROWS):
+        progress(lo / len(shN))
+        rows = slice(lo, lo + _BLOCK_ROWS)
+        turned[rows] = shN[rows]
+        if degree:
+            turns = np.ascontiguousarray(rotations[rows], np.float64)
+            _rotate_sh(turned[rows], turns, np.ascontiguousarray(changed[rows]), degree)
     return turned
 
 

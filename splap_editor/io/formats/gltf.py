@@ -98,6 +98,19 @@ def read(source: Source, progress: Progress) -> tuple[PlyTable, list[str]]:
     return table, warnings
 
 
+def buffers_beside(source: Source) -> list[str]:
+    """Names of the files that a ``.gltf`` keeps its buffers in; a ``.glb`` holds its own.
+
+    Raises
+    ------
+    FormatError
+        If it is damaged.
+    """
+    buffers = _Document(source, no_progress).held.get("buffers")
+    places = [held.get("uri") for held in buffers if isinstance(held, dict)] if isinstance(buffers, list) else []
+    return [unquote(uri) for uri in places if isinstance(uri, str) and not uri.startswith("data:")]
+
+
 class _Document:
     """The JSON of a glTF and its buffers."""
 
@@ -399,26 +412,34 @@ class GlbBuilder:
 
 def splat_attributes(builder: GlbBuilder, splats: Splats, progress: Progress = no_progress) -> dict[str, int]:
     """Add the arrays of bare splats; gives the attributes of their primitive."""
+    n = splats.n_splats
     means = splats.means.astype("<f4")
-    alphas = alphas_of(splats.logit_opacities)
-    progress(0.0)
-    colors = as_bytes(np.column_stack([splats.sh0 * SH_C0 + 0.5, alphas]) * 255)
+    alphas, colors = np.empty(n, "<f4"), np.empty((n, 4), np.uint8)
+    quats, scales = np.empty((n, 4), "<f4"), np.empty((n, 3), "<f4")
+    for rows in row_blocks(n, part_of(progress, 0.0, 0.3)):
+        exact = alphas_of(splats.logit_opacities[rows])
+        alphas[rows] = exact
+        colors[rows] = as_bytes(np.column_stack([splats.sh0[rows] * SH_C0 + 0.5, exact]) * 255)
+        quats[rows] = splats.quats[rows][:, [1, 2, 3, 0]]
+        scales[rows] = np.exp(splats.log_scales[rows])
     bounds = {"min": means.min(axis=0).tolist(), "max": means.max(axis=0).tolist()}
     attributes = {
         "POSITION": builder.add(means, **bounds),
         "COLOR_0": builder.add(colors, normalized=True),
-        f"{EXTENSION}:ROTATION": builder.add(splats.quats[:, [1, 2, 3, 0]].astype("<f4")),
-        f"{EXTENSION}:SCALE": builder.add(np.exp(splats.log_scales).astype("<f4")),
-        f"{EXTENSION}:OPACITY": builder.add(alphas.astype("<f4")),
+        f"{EXTENSION}:ROTATION": builder.add(quats),
+        f"{EXTENSION}:SCALE": builder.add(scales),
+        f"{EXTENSION}:OPACITY": builder.add(alphas),
         f"{EXTENSION}:SH_DEGREE_0_COEF_0": builder.add(splats.sh0.astype("<f4")),
     }
+    progress(0.3)
     at = 0
     for degree in range(1, splats.sh_degree + 1):
         for number in range(2 * degree + 1):
             name = f"{EXTENSION}:SH_DEGREE_{degree}_COEF_{number}"
             attributes[name] = builder.add(splats.shN[:, at].astype("<f4"))
             at += 1
-            progress(at / splats.shN.shape[1])
+            progress(0.3 + 0.7 * at / splats.shN.shape[1])
+    progress(1.0)
     return attributes
 
 

@@ -7,8 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.camera_path import CameraTrack
+from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.splats.rotations import matrices_to_quats
 from splap_editor.core.splats.splats import Splats
+from splap_editor.io.formats.bare_splats import row_blocks
 from splap_editor.io.formats.gltf import GlbBuilder, splat_attributes, splat_document
 
 POINTER = "KHR_animation_pointer"
@@ -53,24 +55,27 @@ class Skin:
     place: NDArray[np.float64]
     camera: CameraTrack | None = None
 
-    def blended(self, means: NDArray[np.floating], frame: int) -> NDArray[np.float64]:
+    def blended(self, means: NDArray[np.floating], frame: int, progress: Progress = no_progress) -> NDArray[np.float64]:
         """Where a program that plays the skin puts points at rest, before the whole is put in its place."""
-        means = np.asarray(means, np.float64)
-        moved = means * (1 - self.weights.sum(axis=1, keepdims=True))
-        for joint, center in enumerate(self.centers):
-            w, x, y, z = self.rotations[frame, joint]
-            axis, local = np.array([x, y, z]), (means - center) * self.scales[frame, joint]
-            twice = 2 * np.cross(axis, local)
-            turned = local + w * twice + np.cross(axis, twice)
-            moved += self.weights[:, joint, None] * (turned + center + self.translations[frame, joint])
-        return moved
+        played = np.empty((len(means), 3))
+        for rows in row_blocks(len(means), progress):
+            rest = np.asarray(means[rows], np.float64)
+            moved = rest * (1 - self.weights[rows].sum(axis=1, keepdims=True))
+            for joint, center in enumerate(self.centers):
+                w, x, y, z = self.rotations[frame, joint]
+                axis, local = np.array([x, y, z]), (rest - center) * self.scales[frame, joint]
+                twice = 2 * np.cross(axis, local)
+                turned = local + w * twice + np.cross(axis, twice)
+                moved += self.weights[rows, joint, None] * (turned + center + self.translations[frame, joint])
+            played[rows] = moved
+        return played
 
 
-def write(out: BinaryIO, splats: Splats, skin: Skin) -> None:
+def write(out: BinaryIO, splats: Splats, skin: Skin, progress: Progress = no_progress) -> None:
     """Write bare splats with their skin as a ``.glb``."""
     builder = GlbBuilder()
-    attributes = splat_attributes(builder, splats)
-    for number, (numbers, weights) in enumerate(_sets(skin.weights)):
+    attributes = splat_attributes(builder, splats, part_of(progress, 0.0, 0.3))
+    for number, (numbers, weights) in enumerate(_sets(skin.weights, part_of(progress, 0.3, 0.5))):
         attributes[f"JOINTS_{number}"] = builder.add(numbers)
         attributes[f"WEIGHTS_{number}"] = builder.add(weights)
     document = splat_document(attributes)
@@ -96,7 +101,8 @@ def write(out: BinaryIO, splats: Splats, skin: Skin) -> None:
     if skin.camera is not None:
         _add_camera(document, animation, skin.camera)
     document["animations"] = [animation.held]
-    builder.write(out, document)
+    builder.write(out, document, part_of(progress, 0.5, 1.0))
+    progress(1.0)
 
 
 class _Animation:
@@ -161,18 +167,20 @@ def _add_camera(document: dict[str, Any], animation: _Animation, camera: CameraT
             document["extensionsUsed"] = sorted({*document["extensionsUsed"], POINTER})
 
 
-def _sets(weights: NDArray[np.floating]) -> list[tuple[NDArray[np.uint16], NDArray[np.float32]]]:
+def _sets(weights: NDArray[np.floating], progress: Progress) -> list[tuple[NDArray[np.uint16], NDArray[np.float32]]]:
     """Joints and weights in fours, the heaviest first; the resting joint takes what is left of one."""
-    weights = np.where(weights < _SMALLEST, 0, weights)
-    whole = np.column_stack([weights, np.maximum(1 - weights.sum(axis=1), 0)])
-    whole /= whole.sum(axis=1, keepdims=True)
-    n_used = max(int((whole > 0).sum(axis=1).max()), 1)
-    n_sets = -(-n_used // 4)
-    order = np.argsort(-whole, axis=1, kind="stable")[:, : 4 * n_sets]
-    held = np.take_along_axis(whole, order, axis=1)
-    # A joint that weighs nothing must be number 0.
-    order = np.where(held > 0, order, 0)
-    short = 4 * n_sets - order.shape[1]
-    order, held = (np.pad(array, ((0, 0), (0, short))) for array in (order, held))
-    fours = [slice(4 * number, 4 * number + 4) for number in range(n_sets)]
-    return [(order[:, four].astype("<u2"), held[:, four].astype("<f4")) for four in fours]
+    n, n_joints = weights.shape
+    n_most = -(-(n_joints + 1) // 4)
+    joints, shares = np.zeros((n, 4 * n_most), "<u2"), np.zeros((n, 4 * n_most), "<f4")
+    n_used = 1
+    for rows in row_blocks(n, progress):
+        held = np.where(weights[rows] < _SMALLEST, 0, weights[rows])
+        whole = np.column_stack([held, np.maximum(1 - held.sum(axis=1), 0)])
+        whole /= whole.sum(axis=1, keepdims=True)
+        n_used = max(n_used, int((whole > 0).sum(axis=1).max()))
+        order = np.argsort(-whole, axis=1, kind="stable")
+        held = np.take_along_axis(whole, order, axis=1)
+        # A joint that weighs nothing must be number 0.
+        joints[rows, : n_joints + 1], shares[rows, : n_joints + 1] = np.where(held > 0, order, 0), held
+    fours = [slice(4 * number, 4 * number + 4) for number in range(-(-n_used // 4))]
+    return [(joints[:, four], shares[:, four]) for four in fours]

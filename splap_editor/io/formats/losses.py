@@ -14,7 +14,9 @@ _SHOWN = 6
 _IDLE = ("nx", "ny", "nz")
 
 
-def losses(file: SplatFile, splats: Splats, bare: Splats, n_unusable: int, row: SplatFormat) -> list[str]:
+def losses(
+    file: SplatFile, splats: Splats, bare: Splats, n_unusable: int, row: SplatFormat, *, is_kept: bool = False
+) -> list[str]:
     """Say what saving in a format loses, each as a sentence.
 
     Parameters
@@ -27,11 +29,22 @@ def losses(file: SplatFile, splats: Splats, bare: Splats, n_unusable: int, row: 
         What `bare_splats` counted.
     row : SplatFormat
         Where to.
+    is_kept : bool
+        The file was one of that format, and its rows keep their order.
     """
-    return [] if row.is_lossless else list(_losses(file, splats, bare, n_unusable, row))
+    if row.is_lossless:
+        return []
+    found = list(_losses(file, splats, bare, n_unusable, row))
+    if row.rounds:
+        again = " once more, those of splats that stay as they were too" if is_kept else ""
+        found.append(f"Numbers are rounded{again}: {row.rounds}.")
+    if row.reorders and not is_kept:
+        found.append("Rows stand in another order: recipes and sessions that name rows do not fit this file.")
+    return found
 
 
 def _losses(file: SplatFile, splats: Splats, bare: Splats, n_unusable: int, row: SplatFormat) -> Iterator[str]:
+    """What is lost of these splats; what happens to any is left to `losses`."""
     smallest, largest = row.log_scales
     if splats.n_scales == 2:
         yield f"Flat splats (2DGS) become discs {np.exp(smallest):.0e} thick."
@@ -47,8 +60,9 @@ def _losses(file: SplatFile, splats: Splats, bare: Splats, n_unusable: int, row:
     if other:
         more = f" and {len(other) - _SHOWN} more" if len(other) > _SHOWN else ""
         yield f"Columns that are no part of a splat are not kept: {', '.join(other[:_SHOWN])}{more}."
-    if len(file.table.header.elements) > 1 and file.layout.columns is not None:
-        names = [element.name for element in file.table.header.elements if element.name != "vertex"]
+    of_splats = {"vertex"} if file.layout.columns is not None else {"vertex", "chunk", "sh"}
+    names = [element.name for element in file.table.header.elements if element.name not in of_splats]
+    if names:
         yield f"Elements beside the splats are not kept: {', '.join(names[:_SHOWN])}."
     # The thin scale of a flat splat is said already.
     with np.errstate(invalid="ignore"):
@@ -63,10 +77,6 @@ def _losses(file: SplatFile, splats: Splats, bare: Splats, n_unusable: int, row:
         pale = int(((bare.sh0 < least) | (bare.sh0 > most)).any(axis=1).sum())
         if pale:
             yield f"{_splats(pale)} of a colour too bright or too dark: made as bright or dark as can be."
-    if row.rounds:
-        yield f"Numbers are rounded: {row.rounds}."
-    if row.reorders:
-        yield "Rows stand in another order: recipes and sessions that name rows do not fit this file."
 
 
 def _splats(n: int) -> str:

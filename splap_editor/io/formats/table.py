@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from splap_editor.core.camera_path import CameraTrack
-from splap_editor.core.progress import Progress
+from splap_editor.core.progress import FrameProgress, Progress
 from splap_editor.core.splats.splats import Splats
 from splap_editor.io.formats.bare_splats import THIN_LOG_SCALE
 from splap_editor.io.formats.source import FormatError, Source
@@ -37,6 +37,8 @@ class SplatFormat:
         ``"module:function"`` in `splap_editor.io.formats`, imported when it is needed; empty where there is none.
     writes_frames : str
         The same for frames of an animation; empty where one file holds one frame.
+    names_others : str
+        The same for the names of the files beside it that hold its numbers; empty where it holds them itself.
     rounds : str
         What writing does to the numbers, as a clause; empty where nothing.
     reorders : bool
@@ -58,6 +60,7 @@ class SplatFormat:
     reads: str = ""
     writes: str = ""
     writes_frames: str = ""
+    names_others: str = ""
     rounds: str = ""
     reorders: bool = False
     largest_degree: int = 3
@@ -97,6 +100,17 @@ class SplatFormat:
         read: Callable[[Source, Progress], tuple[PlyTable, list[str]]] = _function(self.reads)
         return read(source, progress)
 
+    def others(self, source: Source) -> list[str]:
+        """Names of the files beside it that hold its numbers.
+
+        Raises
+        ------
+        FormatError
+            If it does not say.
+        """
+        names: Callable[[Source], list[str]] = _function(self.names_others)
+        return names(source)
+
     def write(self, out: BinaryIO, splats: Splats, progress: Progress) -> None:
         """Encode bare splats.
 
@@ -109,7 +123,12 @@ class SplatFormat:
         write(out, splats, progress)
 
     def write_frames(
-        self, out: BinaryIO, frames: Iterable[tuple[int, Splats]], rate: float, camera: CameraTrack | None
+        self,
+        out: BinaryIO,
+        frames: Iterable[tuple[int, Splats]],
+        rate: float,
+        camera: CameraTrack | None,
+        progress_of: FrameProgress,
     ) -> None:
         """Encode bare splats at each frame of an animation, ``rate`` frames a second, and a camera that films them.
 
@@ -118,9 +137,9 @@ class SplatFormat:
         FormatError
             As of `write`.
         """
-        write: Callable[[BinaryIO, Iterable[tuple[int, Splats]], float, CameraTrack | None], None]
+        write: Callable[[BinaryIO, Iterable[tuple[int, Splats]], float, CameraTrack | None, FrameProgress], None]
         write = _function(self.writes_frames)
-        write(out, frames, rate, camera)
+        write(out, frames, rate, camera, progress_of)
 
 
 def _function(path: str) -> Callable:
@@ -243,6 +262,7 @@ FORMATS: dict[str, SplatFormat] = {
             ("meta.json",),
             _is_sog_meta,
             reads="sog:read_folder",
+            names_others="sog:pictures_beside",
             reorders=True,
         ),
         SplatFormat(
@@ -252,6 +272,7 @@ FORMATS: dict[str, SplatFormat] = {
             _is_gltf,
             reads="gltf:read",
             writes="gltf:write",
+            names_others="gltf:buffers_beside",
             readers="PlayCanvas, Babylon.js, Cesium",
             also_read=(".gltf",),
         ),
@@ -261,6 +282,13 @@ FORMATS: dict[str, SplatFormat] = {
     )
 }
 """Every format by name; of several that a file's bytes could be the first is meant."""
+
+
+def stem_of(path: Path) -> str:
+    """A file's name without the ending of its format; of one that is nothing but the ending, its folder's."""
+    named = format_named(path)
+    suffix = next((s for s in named.suffixes if path.name.lower().endswith(s)), "") if named else path.suffix
+    return path.name[: len(path.name) - len(suffix)] or path.absolute().parent.name
 
 
 def format_of(path: Path, start: bytes) -> SplatFormat:

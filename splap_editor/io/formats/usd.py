@@ -15,11 +15,12 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from splap_editor.core.camera_path import CameraTrack
-from splap_editor.core.progress import Progress, no_progress, part_of
+from splap_editor.core.progress import FrameProgress, Progress, part_of
 from splap_editor.core.splats.splats import Splats
 from splap_editor.io.formats.bare_splats import FAINT, OPAQUE, alphas_of, row_blocks
 from splap_editor.io.formats.source import FormatError, Source
 from splap_editor.io.formats.splat32 import log_scales_of
+from splap_editor.io.formats.usd_package import copy_bytes, write_package
 from splap_editor.io.npz import NpzError, NpzFile
 from splap_editor.io.ply_table import PlyTable
 from splap_editor.io.splat_cells import blank_table
@@ -100,38 +101,51 @@ def unpacked(source: Source, held: Path, progress: Progress) -> tuple[str, str] 
 
 def write_usdc(out: BinaryIO, splats: Splats, progress: Progress) -> None:
     """Encode bare splats as a ``.usdc``."""
-    _write(out, [(1, splats)], 24.0, is_package=False, progress=progress)
+    _write(out, [(1, splats)], 24.0, _halves(progress), is_package=False)
     progress(1.0)
 
 
 def write_usdz(out: BinaryIO, splats: Splats, progress: Progress) -> None:
     """Encode bare splats as a ``.usdz``."""
-    _write(out, [(1, splats)], 24.0, is_package=True, progress=progress)
+    _write(out, [(1, splats)], 24.0, _halves(progress), is_package=True)
     progress(1.0)
 
 
+def _halves(progress: Progress) -> FrameProgress:
+    """Progress of a single frame, and of what follows it."""
+    return lambda place: part_of(progress, place / 2, (place + 1) / 2)
+
+
 def write_usdc_frames(
-    out: BinaryIO, frames: Iterable[tuple[int, Splats]], rate: float, camera: CameraTrack | None
+    out: BinaryIO,
+    frames: Iterable[tuple[int, Splats]],
+    rate: float,
+    camera: CameraTrack | None,
+    progress_of: FrameProgress,
 ) -> None:
     """Encode an animation, and the camera that films it, as a ``.usdc``."""
-    _write(out, frames, rate, is_package=False, camera=camera)
+    _write(out, frames, rate, progress_of, is_package=False, camera=camera)
 
 
 def write_usdz_frames(
-    out: BinaryIO, frames: Iterable[tuple[int, Splats]], rate: float, camera: CameraTrack | None
+    out: BinaryIO,
+    frames: Iterable[tuple[int, Splats]],
+    rate: float,
+    camera: CameraTrack | None,
+    progress_of: FrameProgress,
 ) -> None:
     """Encode an animation, and the camera that films it, as a ``.usdz``."""
-    _write(out, frames, rate, is_package=True, camera=camera)
+    _write(out, frames, rate, progress_of, is_package=True, camera=camera)
 
 
 def _write(
     out: BinaryIO,
     frames: Iterable[tuple[int, Splats]],
     rate: float,
+    progress_of: FrameProgress,
     *,
     is_package: bool,
     camera: CameraTrack | None = None,
-    progress: Progress = no_progress,
 ) -> None:
     """Encode bare splats as a stage, time-sampled where there is more than one frame.
 
@@ -142,19 +156,19 @@ def _write(
         The same splats at each frame; opacities and colours of degree 0 are those of the first.
     rate : float
         Frames per second.
+    progress_of : FrameProgress
+        Told between arrays of each frame, and for each MiB written after the last.
     is_package : bool
         A ``.usdz``, which wraps a ``.usdc``.
     camera : CameraTrack, optional
         At each frame.
-    progress : Progress
-        Told between arrays, and for each MiB written, of one frame.
     """
     _require_library()
-    from pxr import Sdf, Usd, UsdGeom, UsdUtils
+    from pxr import Usd, UsdGeom
 
     with tempfile.TemporaryDirectory() as folder:
-        layer = str(Path(folder) / "splats.usdc")
-        stage = Usd.Stage.CreateNew(layer)
+        layer = Path(folder) / "splats.usdc"
+        stage = Usd.Stage.CreateNew(str(layer))
         UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
         stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, _ROOT).GetPrim())
         prim = stage.DefinePrim(_PRIM, "ParticleField3DGaussianSplat")
@@ -163,37 +177,38 @@ def _write(
         stage.SetTimeCodesPerSecond(rate)
         numbers: list[int] = []
         kept: dict[str, Any] = {}
-        for number, splats in frames:
+        for place, (number, splats) in enumerate(frames):
+            progress = progress_of(place)
             if len(numbers) == 1:
                 # A second frame: what stood for all times was the first.
                 for name, values in kept.items():
                     attribute = prim.GetAttribute(name)
                     attribute.Clear()
                     attribute.Set(values, numbers[0])
-            arrays = _moving(splats, part_of(progress, 0.0, 0.3))
+            arrays = _moving(splats, part_of(progress, 0.0, 0.6))
             for name, values in arrays.items():
                 prim.GetAttribute(name).Set(values, number) if numbers else prim.GetAttribute(name).Set(values)
             kept = arrays if not numbers else {}
-            progress(0.4)
+            progress(0.8)
             if not numbers:
                 _set_still(prim, splats)
-                progress(0.5)
+            progress(1.0)
             numbers.append(number)
+        progress = progress_of(len(numbers))
+        progress(0.0)
         if camera is not None:
             _add_camera(stage, camera, numbers)
         if len(numbers) > 1:
             stage.SetStartTimeCode(numbers[0])
             stage.SetEndTimeCode(numbers[-1])
         stage.GetRootLayer().Save()
-        progress(0.8)
+        progress(0.5)
+        copied = part_of(progress, 0.5, 1.0)
         if is_package:
-            package = str(Path(folder) / "splats.usdz")
-            UsdUtils.CreateNewUsdzPackage(Sdf.AssetPath(layer), package)
-            layer = package
-        with open(layer, "rb") as file:
-            while chunk := file.read(1 << 20):
-                out.write(chunk)
-                progress(0.9)
+            write_package(out, layer, copied)
+        else:
+            with layer.open("rb") as file:
+                copy_bytes(file, out.write, layer.stat().st_size, copied)
 
 
 def _add_camera(stage: Any, camera: CameraTrack, numbers: list[int]) -> None:
@@ -226,8 +241,9 @@ def _moving(splats: Splats, progress: Progress) -> dict[str, Any]:
     found = {
         "positions": Vt.Vec3fArray.FromNumpy(_floats(splats.means)),
         "scales": Vt.Vec3fArray.FromNumpy(_floats(np.exp(splats.log_scales))),
-        "orientations": Vt.QuatfArray.FromNumpy(_floats(splats.quats[:, [1, 2, 3, 0]])),
     }
+    progress(0.1)
+    found["orientations"] = Vt.QuatfArray.FromNumpy(_floats(splats.quats[:, [1, 2, 3, 0]]))
     progress(0.2)
     n_coefficients = splats.shN.shape[1]
     if n_coefficients:

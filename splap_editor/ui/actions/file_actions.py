@@ -10,6 +10,7 @@ from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QFileDialog, QMessageBox, QWidget
 
 from splap_editor.engine.export_report import ExportReport
+from splap_editor.io.formats.table import stem_of
 from splap_editor.io.session_file import SUFFIX
 from splap_editor.io.splat_files import are_splats, name_filter
 from splap_editor.resources import resource
@@ -104,7 +105,7 @@ class FileActions:
     def export(self) -> None:
         """Ask where to, and write what is on screen."""
         scene = self._session.shown_scene
-        suggested = folder_to_write(scene.file.path) / f"{scene.file.path.stem}_edited.ply"
+        suggested = folder_to_write(scene.file.path) / f"{stem_of(scene.file.path)}_edited.ply"
         lacks = column_lacks(scene, self._session.bound)
         dialog = ExportDialog(self._window, suggested, scene, lacks, self._session.detail_worker)
         dialog.accepted.connect(lambda: self._export(dialog))
@@ -118,7 +119,9 @@ class FileActions:
     def export_edit(self) -> None:
         """Ask where to, and write the edit as a recipe."""
         source = self._session.shown_scene.file.path
-        dialog = QFileDialog(self._window, "Export the edit", str(folder_to_write(source) / f"{source.stem}_edit.json"))
+        dialog = QFileDialog(
+            self._window, "Export the edit", str(folder_to_write(source) / f"{stem_of(source)}_edit.json")
+        )
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.setNameFilter(EDIT_FILTER)
         dialog.setDefaultSuffix("json")

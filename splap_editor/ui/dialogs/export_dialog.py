@@ -61,8 +61,11 @@ class ExportDialog(QDialog):
         line.addWidget(self.path_field, 1)
         line.addWidget(browse)
         n = scene.splats.n_splats
+        is_edited = not scene.edit.is_identity
         of_ply = f"{n:,} splats in the file's own order and layout; rows that did not move stay as they are."
-        self.choice = FormatChoice(scene.file, threads, of_ply)
+        if is_edited and scene.file.layout.columns is None:
+            of_ply = f"{n:,} splats in the file's own order, no longer compressed."
+        self.choice = FormatChoice(scene.file, threads, of_ply, is_edited=is_edited)
         self.choice.chosen.connect(self._on_format_chosen)
         self.finished.connect(self.choice.give_up)
         self.note = PlainLabel(wordWrap=True)

@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
 
 from splap_editor.core.timeline import LAST_FRAME, Timeline
 from splap_editor.engine.frames import holds_all_frames
-from splap_editor.io.formats.table import FORMATS, format_to_write
+from splap_editor.io.formats.table import FORMATS, format_to_write, stem_of
 from splap_editor.io.ply import SplatFile
 from splap_editor.io.splat_files import FormatError, name_filter
 from splap_editor.io.video import VIDEOS
@@ -85,7 +85,10 @@ class FramesDialog(QDialog):
         self.width_field.show_value(size[0])
         self.height_field.show_value(size[1])
         self.transparent = QCheckBox("Transparent background")
-        self.choice = FormatChoice(file, threads, "A file for each frame, in the order and layout of the one open.")
+        of_ply = "A file for each frame, in the order and layout of the one open."
+        if file.layout.columns is None:
+            of_ply = "A file for each frame, in the order of the one open, no longer compressed."
+        self.choice = FormatChoice(file, threads, of_ply, is_edited=True)
         self.choice.chosen.connect(self._on_format_chosen)
         self.choice.told.connect(self._show_whether_possible)
         self.finished.connect(self.choice.give_up)
@@ -156,7 +159,7 @@ class FramesDialog(QDialog):
     def _ask_for_path(self) -> None:
         of_splats = self.kind.currentData() == "splats"
         suffix = self.choice.format.suffixes[0] if of_splats else ".png"
-        suggested = self._name or folder_to_write(self._source) / f"{self._source.stem}{suffix}"
+        suggested = self._name or folder_to_write(self._source) / f"{stem_of(self._source)}{suffix}"
         dialog = QFileDialog(self.parentWidget(), "Name the frames", str(suggested))
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)

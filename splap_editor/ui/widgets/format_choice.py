@@ -48,14 +48,16 @@ class FormatChoice(QWidget):
     threads : Threads
     of_ply : str
         What to say of a PLY.
+    is_edited : bool
+        Whether it is saved otherwise than it is.
     """
 
     chosen = Signal(str)
     told = Signal()
 
-    def __init__(self, file: SplatFile, threads: Threads, of_ply: str, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self._file, self._of_ply = file, of_ply
+    def __init__(self, file: SplatFile, threads: Threads, of_ply: str, *, is_edited: bool) -> None:
+        super().__init__()
+        self._file, self._of_ply, self._is_edited = file, of_ply, is_edited
         self._misread = _misread(file)
         self._losses: dict[tuple[str, bool], list[str]] = {("ply", False): []}
         if file.splats.n_scales == 2:
@@ -104,9 +106,11 @@ class FormatChoice(QWidget):
         self.field.setCurrentIndex(self.field.findData(row.name))
         self._job.drop()
         if not self.is_told:
-            as_3dgs = shown[1]
+            as_3dgs, is_edited = shown[1], self._is_edited
             self._job.ask(
-                lambda job: losses_of_saving(self._file, row, as_3dgs=as_3dgs, progress=job.progress("losses")),
+                lambda job: losses_of_saving(
+                    self._file, row, as_3dgs=as_3dgs, is_edited=is_edited, progress=job.progress("losses")
+                ),
                 lambda found: self._know(shown, found),
                 # What cannot be told must not keep anybody from saving.
                 failed=lambda error: self._know(shown, [f"What it loses could not be worked out: {error}"]),

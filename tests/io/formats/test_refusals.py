@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 from splap_editor.engine.recipe_edit import edit_of, require_rows_fit, rows_of
+from splap_editor.io.content_hash import content_hash
 from splap_editor.io.formats import sog
 from splap_editor.io.formats.source import FormatError
 from splap_editor.io.plain_edit import Edit, Handle, Pin
 from splap_editor.io.ply import PlyError
 from splap_editor.io.recipe import RecipeError, recipe_from_json, recipe_to_json
 from splap_editor.io.sample_maker import shape_sample, write_sample
-from splap_editor.io.session_file import content_hash
 from splap_editor.io.splat_files import read_splats, write_splats
 
 

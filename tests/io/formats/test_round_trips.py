@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from splap_editor.core.splats.splats import Splats
 from splap_editor.io.formats.bare_splats import THIN_LOG_SCALE, alphas_of, bare_splats
-from splap_editor.io.formats.table import FORMATS, format_to_write
+from splap_editor.io.formats.table import FORMATS, format_to_write, stem_of
 from splap_editor.io.ply import read_ply, write_ply
 from splap_editor.io.sample_maker import write_sample
 from splap_editor.io.splat_files import are_splats, losses_by_format, losses_of_saving, read_splats, write_splats
@@ -94,8 +94,9 @@ def test_what_was_rounded_once_is_not_rounded_again(tmp_path, ending):
     file = as_file(tmp_path, scene())
     write_splats(tmp_path / f"one{ending}", file, file.splats)
     once = read_splats(tmp_path / f"one{ending}")
-    # A compressed PLY of a compressed PLY keeps its rows.
-    write_splats(tmp_path / f"two{ending}", once, dataclasses.replace(once.splats))
+    # A compressed PLY of the compressed PLY itself would be a copy.
+    again = as_file(tmp_path, once.splats, "again.ply")
+    write_splats(tmp_path / f"two{ending}", again, again.splats)
     twice = in_order_of(once.splats, read_splats(tmp_path / f"two{ending}").splats)
     errors = largest_errors(once.splats, twice)
     assert errors["means"] < 1e-5
@@ -119,8 +120,28 @@ def test_an_edited_compressed_ply_stays_compressed_and_keeps_its_rows(tmp_path):
     again = read_splats(tmp_path / "moved.compressed.ply")
     assert again.layout.name == "supersplat-compressed"
     np.testing.assert_allclose(again.splats.means, moved.means, atol=2e-3)
-    write_splats(tmp_path / "same.compressed.ply", packed, packed.splats)
+    # Splats that are equal are unedited, whoever made them.
+    write_splats(tmp_path / "same.compressed.ply", packed, dataclasses.replace(packed.splats))
     assert (tmp_path / "same.compressed.ply").read_bytes() == (tmp_path / "packed.compressed.ply").read_bytes()
+
+
+def test_an_edited_compressed_ply_says_that_it_is_rounded_again_and_a_copy_loses_nothing(tmp_path):
+    file = as_file(tmp_path, scene())
+    write_splats(tmp_path / "packed.compressed.ply", file, file.splats)
+    packed, row = read_splats(tmp_path / "packed.compressed.ply"), FORMATS["compressed-ply"]
+    assert losses_of_saving(packed, row) == []
+    (told,) = losses_of_saving(packed, row, is_edited=True)
+    assert told.startswith("Numbers are rounded once more")
+    assert losses_of_saving(packed, FORMATS["ply"], is_edited=True) == []
+    (by_info,) = losses_by_format(packed)[".compressed.ply"]
+    assert by_info == f"Only if it is edited: {told}"
+    # It is true of those that stay: one of 256 that goes far makes the steps of the others coarser.
+    means = packed.splats.means.copy()
+    means[0] += 1000
+    write_splats(tmp_path / "far.compressed.ply", packed, dataclasses.replace(packed.splats, means=means))
+    again = read_splats(tmp_path / "far.compressed.ply").splats
+    assert np.abs(again.means[1:256] - means[1:256]).max() > 0.1
+    np.testing.assert_allclose(again.means[256:], means[256:], atol=1e-5)
 
 
 def test_gsply_reads_our_spz_as_we_do(tmp_path):
@@ -314,3 +335,19 @@ def test_edits_and_sessions_are_not_taken_for_splats(tmp_path):
     assert not are_splats(tmp_path / "edit.json") and not are_splats(tmp_path / "long.json")
     assert not are_splats(tmp_path / "nowhere.json") and not are_splats(tmp_path)
     assert are_splats(tmp_path / "folder") and are_splats(tmp_path / "folder" / "meta.json")
+
+
+@pytest.mark.parametrize(
+    ("name", "stem"),
+    [
+        ("a.ply", "a"),
+        ("a.b.ply", "a.b"),
+        ("a.COMPRESSED.ply", "a"),
+        ("a.spz", "a"),
+        ("a.png", "a"),
+        ("a", "a"),
+        ("meta.json", "garden"),
+    ],
+)
+def test_a_files_own_name_is_what_stands_before_the_ending_of_its_format(name, stem):
+    assert stem_of(Path("/captures/garden") / name) == stem

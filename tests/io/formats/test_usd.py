@@ -4,6 +4,7 @@ import dataclasses
 import os
 import subprocess
 import sys
+import zipfile
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from pxr import Usd, UsdGeom, Vt
 from splap_editor.core.camera_path import CameraPose, camera_track
 from splap_editor.core.place import Place
 from splap_editor.core.progress import Cancelled
-from splap_editor.io.formats import usd
+from splap_editor.io.formats import usd, usd_package
 from splap_editor.io.formats.source import FormatError
 from splap_editor.io.sample_maker import shape_sample, write_sample
 from splap_editor.io.splat_files import read_splats, write_animation, write_splats
@@ -44,6 +45,54 @@ def test_an_animation_is_one_time_sampled_file(tmp_path, scene, ending):
     first = read_splats(path)
     np.testing.assert_allclose(first.splats.means, frames[0][1].means, atol=1e-6)
     assert any("first frame" in warning for warning in first.warnings)
+
+
+@pytest.mark.parametrize("ending", [".usdc", ".usdz"])
+def test_an_animation_tells_how_far_it_is_within_a_frame_and_stops_there(tmp_path, scene, ending):
+    frames = [(number, moved(scene, number)) for number in (1, 2)]
+    told: list[tuple[int, float]] = []
+
+    def progress_of(place):
+        return lambda share: told.append((place, share))
+
+    write_animation(tmp_path / f"whole{ending}", scene, frames, 24.0, progress_of=progress_of)
+    assert told == sorted(told) and all(0 <= share <= 1 for _, share in told)
+    # Two frames, and what follows them.
+    assert {place for place, _ in told} == {0, 1, 2}
+    assert all(sum(place == which for place, _ in told) >= 3 for which in range(3))
+    for stop in (told[1], told[len(told) // 2], told[-1]):
+
+        def stopping_at(place, stop=stop):
+            def cancel(share):
+                if (place, share) >= stop:
+                    raise Cancelled
+
+            return cancel
+
+        with pytest.raises(Cancelled):
+            write_animation(tmp_path / f"part{ending}", scene, frames, 24.0, progress_of=stopping_at)
+        assert not list(tmp_path.glob("*part*"))
+
+
+def test_a_package_is_a_zip_of_one_layer_at_a_multiple_of_64_and_the_same_each_time(tmp_path, scene):
+    write_splats(tmp_path / "one.usdz", scene, scene.splats)
+    write_splats(tmp_path / "layer.usdc", scene, scene.splats)
+    with zipfile.ZipFile(tmp_path / "one.usdz") as package:
+        (member,) = package.infolist()
+        assert package.testzip() is None and member.compress_type == zipfile.ZIP_STORED
+        data = package.read(member)
+    assert data == (tmp_path / "layer.usdc").read_bytes()
+    whole = (tmp_path / "one.usdz").read_bytes()
+    assert whole.index(data) % 64 == 0
+    stage = Usd.Stage.Open(str(tmp_path / "one.usdz"))
+    np.testing.assert_array_equal(stage.GetPrimAtPath(PRIM).GetAttribute("positions").Get(), scene.splats.means)
+
+
+def test_a_package_too_large_for_zip_is_refused_in_a_sentence(tmp_path, scene, monkeypatch):
+    monkeypatch.setattr(usd_package, "LARGEST_LAYER", 100)
+    with pytest.raises(FormatError, match=r"at most 4 GiB.*save fewer frames or a \.usdc"):
+        write_splats(tmp_path / "out.usdz", scene, scene.splats)
+    assert not (tmp_path / "out.usdz").exists()
 
 
 @pytest.mark.parametrize("is_parallel", [False, True])
