@@ -6,8 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from splap_editor.cleaning_cli import add_output_path, picked_box, read_input, tell_written, write_edited
-from splap_editor.core.grade_options import GradeOptions
-from splap_editor.core.options import options_of
 from splap_editor.stage_report import StageReport
 
 if TYPE_CHECKING:
@@ -16,6 +14,9 @@ if TYPE_CHECKING:
 
 def add_grade(parser: argparse.ArgumentParser) -> None:
     """Add the flags of ``splap-editor grade``: a grade's options, and what it is of."""
+    from splap_editor.core.grade_options import GradeOptions
+    from splap_editor.core.options import options_of
+
     add_output_path(parser)
     for name, known in options_of(GradeOptions).items():
         words = f"{known.sentence[0].lower()}{known.sentence[1:].rstrip('.')}; default {known.default:g}"
@@ -74,6 +75,8 @@ def merge(options: argparse.Namespace) -> int:
 def grade(options: argparse.Namespace) -> int:
     """Grade colours and opacities."""
     from splap_editor.core.grade import GradeStep
+    from splap_editor.core.grade_options import GradeOptions
+    from splap_editor.core.options import options_of
     from splap_editor.engine.edit import Edit
     from splap_editor.engine.grading import grading_of
 

@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING
 import splap_editor
 from splap_editor.arranging_cli import add_grade, add_merge
 from splap_editor.cleaning_cli import add_clean, add_place
-from splap_editor.core.graph.options import EDGE_OPTIONS, GraphOptions
-from splap_editor.core.options import options_of
 from splap_editor.installation import commands as installation
 from splap_editor.session.background_thread import leave
 from splap_editor.stage_report import ShareLine, StageReport, printable
@@ -39,7 +37,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0, or 2 after one sentence on standard error that says what is wrong and what to do.
     """
     arguments = list(sys.argv[1:] if arguments is None else arguments)
-    options = _parser().parse_args(_with_command(arguments))
+    arguments = _with_command(arguments)
+    options = _parser(arguments[0]).parse_args(arguments)
     try:
         return options.run(options)
     except (ValueError, OSError, MemoryError) as error:
@@ -58,7 +57,8 @@ def _with_command(arguments: list[str]) -> list[str]:
     return ["edit", *arguments]
 
 
-def _parser() -> argparse.ArgumentParser:
+def _parser(chosen: str) -> argparse.ArgumentParser:
+    """Make the parser; flags that take loading are only those of the command chosen."""
     parser = argparse.ArgumentParser(
         prog="splap-editor",
         description="Bend, pose and reshape captured Gaussian splats. Without a command, open the editor.",
@@ -78,7 +78,8 @@ def _parser() -> argparse.ArgumentParser:
     ):
         command = commands.add_parser(name, help=text)
         _add_input(command)
-        add(command)
+        if chosen == name:
+            add(command)
         _add_output(command)
 
     convert = commands.add_parser("convert", help="write a splat file in another format")
@@ -108,7 +109,8 @@ def _parser() -> argparse.ArgumentParser:
     graph = commands.add_parser("graph", help="write the splat graph as a PLY with vertices and edges")
     _add_input(graph)
     graph.add_argument("-o", "--output", required=True, type=Path, metavar="EDGES.ply")
-    _add_options(graph, GraphOptions, EDGE_OPTIONS)
+    if chosen == "graph":
+        _add_edge_options(graph)
     _add_output(graph)
     graph.set_defaults(run=_graph)
     installation.add_commands(commands)
@@ -166,10 +168,13 @@ def _add_frames(parser: argparse.ArgumentParser, text: str) -> None:
     parser.add_argument("--frames", nargs="?", const="", metavar="A-B", help=f"{text}; all of them by default")
 
 
-def _add_options(parser: argparse.ArgumentParser, group: type, names: Sequence[str]) -> None:
-    """Flags for some options of a group; lists of rows are for recipes."""
-    for name, known in options_of(group).items():
-        if name in names and known.kind not in ("pairs", "strokes"):
+def _add_edge_options(parser: argparse.ArgumentParser) -> None:
+    """Flags for what a graph's edges depend on; lists of rows are for recipes."""
+    from splap_editor.core.graph.options import EDGE_OPTIONS, GraphOptions
+    from splap_editor.core.options import options_of
+
+    for name, known in options_of(GraphOptions).items():
+        if name in EDGE_OPTIONS and known.kind not in ("pairs", "strokes"):
             parser.add_argument(
                 f"--{name.replace('_', '-')}",
                 type=type(known.default),
@@ -336,6 +341,7 @@ def _info(options: argparse.Namespace) -> int:
 
 
 def _graph(options: argparse.Namespace) -> int:
+    from splap_editor.core.graph.options import EDGE_OPTIONS, GraphOptions
     from splap_editor.engine.scene_info import graph_info
     from splap_editor.engine.scripting import write_graph
     from splap_editor.io.splat_files import read_splats
