@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.pose import LARGEST_COORDINATE, SCALES, Pose
+from splap_editor.core.pose import SCALES, Pose
 from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.splats.rotations import matrices_to_quats, quat_products, quats_to_matrices
-from splap_editor.core.splats.splats import Splats
+from splap_editor.core.splats.splats import LARGEST_COORDINATE, Splats
 
 
 @dataclass(frozen=True)

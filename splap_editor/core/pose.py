@@ -6,9 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.splats.rotations import matrices_to_quats, quats_to_matrices
-
-LARGEST_COORDINATE = 1e30
-"""Largest coordinate, and largest move of a handle, in world units."""
+from splap_editor.core.splats.splats import LARGEST_COORDINATE
 
 SCALES = (1e-6, 1e6)
 """Least and largest scale of a handle. A coordinate times a scale stays well within single precision, 3.4e38."""

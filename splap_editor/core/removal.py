@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.index_spaces import FileMask, FileRows
-from splap_editor.core.pose import LARGEST_COORDINATE
 from splap_editor.core.splats.rotations import quats_to_matrices
+from splap_editor.core.splats.splats import LARGEST_COORDINATE
 
 Vector = tuple[float, float, float]
 

@@ -9,7 +9,7 @@ from typing import Any, Literal, TypeVar, overload
 
 from splap_editor.core.index_spaces import FileRow
 from splap_editor.core.options import Option, options_of
-from splap_editor.core.pose import LARGEST_COORDINATE
+from splap_editor.core.splats.splats import LARGEST_COORDINATE
 
 Error = Callable[[str], ValueError]
 Group = TypeVar("Group")

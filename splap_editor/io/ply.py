@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from splap_editor.core.index_spaces import FileMask
-from splap_editor.core.pose import LARGEST_COORDINATE
 from splap_editor.core.progress import Progress, no_progress, part_of
-from splap_editor.core.splats.splats import Splats
+from splap_editor.core.splats.splats import LARGEST_COORDINATE, Splats
 from splap_editor.io.atomic_file import atomic_file, way_out
 from splap_editor.io.formats.bare_splats import THIN_LOG_SCALE, bare_splats
 from splap_editor.io.layout import COMMON_NAMES, SPLATS_SHARE, Layout, PlyEvidence

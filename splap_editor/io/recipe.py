@@ -10,10 +10,11 @@ from splap_editor.core.adaptation.options import AdaptationOptions
 from splap_editor.core.deformers import DEFORMERS, method_titles
 from splap_editor.core.graph.options import GraphOptions, Joint, Separation
 from splap_editor.core.options import OptionSet, ShareOfSize, options_of
-from splap_editor.core.pose import LARGEST_COORDINATE, SCALES, Pose
+from splap_editor.core.pose import SCALES, Pose
 from splap_editor.core.presets import PRESETS, with_preset
 from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.reach_options import CageOptions, ReachOptions
+from splap_editor.core.splats.splats import LARGEST_COORDINATE
 from splap_editor.io.atomic_file import atomic_file, way_out
 from splap_editor.io.json_object import JsonObject, Look, json_lines, no_look, parsed_json, shown
 from splap_editor.io.plain_edit import Edit, Handle, Pin, Vector

@@ -3,7 +3,7 @@
 from typing import Any
 
 from splap_editor.core.camera_path import CameraKey, CameraPose
-from splap_editor.core.pose import LARGEST_COORDINATE
+from splap_editor.core.splats.splats import LARGEST_COORDINATE
 from splap_editor.core.timeline import LAST_FRAME
 from splap_editor.io.json_object import JsonObject
 

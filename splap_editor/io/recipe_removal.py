@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from splap_editor.core.place import Place
-from splap_editor.core.pose import LARGEST_COORDINATE, SCALES
+from splap_editor.core.pose import SCALES
 from splap_editor.core.removal import (
     LARGEST_SIZE,
     Picked,
@@ -20,6 +20,7 @@ from splap_editor.core.removal import (
     PickedSide,
     RemovalStep,
 )
+from splap_editor.core.splats.splats import LARGEST_COORDINATE
 from splap_editor.io.json_object import JsonObject
 
 _POINT = {"type": "number", "minimum": -LARGEST_COORDINATE, "maximum": LARGEST_COORDINATE}

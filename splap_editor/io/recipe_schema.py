@@ -10,9 +10,10 @@ from typing import Any
 from splap_editor.core.deformers import method_titles
 from splap_editor.core.grade_options import GradeOptions
 from splap_editor.core.options import Option, ShareOfSize, options_of
-from splap_editor.core.pose import LARGEST_COORDINATE, SCALES
+from splap_editor.core.pose import SCALES
 from splap_editor.core.presets import PRESETS
 from splap_editor.core.reach_options import CageOptions
+from splap_editor.core.splats.splats import LARGEST_COORDINATE
 from splap_editor.io.recipe import VERSION, recipe_groups
 from splap_editor.io.recipe_camera import camera_schema
 from splap_editor.io.recipe_removal import OUTSIDE, picked_properties, place_schema, removal_schema

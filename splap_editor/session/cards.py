@@ -15,7 +15,7 @@ INERT_WORDS = {
     InertReason.ACTIVE: "",
     InertReason.TRANSPARENT: "too faint to be seen",
     InertReason.THRESHOLD: "its threshold is never reached",
-    InertReason.NON_FINITE: "a number of it is not finite",
+    InertReason.NON_FINITE: "a number of it is not finite, or too large",
     InertReason.ZERO_QUATERNION: "its rotation is all zero",
     InertReason.ZERO_SIZE: "it has no size",
     InertReason.REMOVED: "it is removed",

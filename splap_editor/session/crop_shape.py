@@ -8,10 +8,10 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.pose import LARGEST_COORDINATE
 from splap_editor.core.removal import PickedBall, PickedBox, PickedSide, Vector
 from splap_editor.core.splats.main_subject import MainSubject
 from splap_editor.core.splats.rotations import matrices_to_quats
+from splap_editor.core.splats.splats import LARGEST_COORDINATE
 
 _ROOM = 1.05
 """A shape begins so many times as large as the subject."""

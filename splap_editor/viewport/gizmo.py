@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from splap_editor.core.pose import LARGEST_COORDINATE, SCALES
+from splap_editor.core.pose import SCALES
+from splap_editor.core.splats.splats import LARGEST_COORDINATE
 from splap_editor.viewport.camera import turn
 from splap_editor.viewport.gizmo_parts import (
     ARROW_END,

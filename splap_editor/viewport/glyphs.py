@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from splap_editor.core.splats.occupancy import LENGTHS
 from splap_editor.core.splats.rotations import quats_to_matrices
 from splap_editor.core.splats.splats import Splats
 
@@ -75,8 +76,9 @@ def splat_glyphs(splats: Splats) -> Glyphs:
     """Glyphs of all splats of a file, inert ones included.
 
     The two largest axes span the glyph unless the file fixes a normal axis.
-    Rows with a non-finite number or a zero quaternion get zero axes and the
-    origin as centre, so that nothing of them is drawn.
+    Rows with a number that is not finite or too large to compute with, or a
+    zero quaternion, get zero axes and the origin as centre, so that nothing of
+    them is drawn.
 
     Parameters
     ----------
@@ -92,7 +94,8 @@ def splat_glyphs(splats: Splats) -> Glyphs:
     scales[:, : splats.n_scales] = splats.scales
     quats = np.asarray(splats.quats, np.float64)
     means = np.asarray(splats.means, np.float64)
-    sound = np.isfinite(means).all(1) & np.isfinite(scales).all(1) & np.isfinite(quats).all(1) & (quats != 0).any(1)
+    sound = (np.abs(means) < LENGTHS[1]).all(1) & (scales < LENGTHS[1]).all(1)
+    sound &= np.isfinite(quats).all(1) & (quats != 0).any(1)
     quats = np.where(sound[:, None], quats, [1.0, 0.0, 0.0, 0.0])
     scales = np.where(sound[:, None], scales, 0.0)
     if splats.n_scales == 2:

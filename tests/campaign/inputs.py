@@ -2,6 +2,7 @@
 
 import ast
 import os
+import re
 import selectors
 import subprocess
 import sys
@@ -13,6 +14,7 @@ from pathlib import Path
 from time import monotonic
 
 from tests.campaign.kinds import KINDS, in_turn, input_of
+from tests.campaign.worker import CRASH_NAME
 
 SECONDS = 5.0
 """Of processor time, after which an input is taken to hang: what other programs do beside it counts for nothing."""
@@ -75,10 +77,16 @@ class Worker:
         self._is_fresh = False
         if answer is not None and answer:
             return ast.literal_eval(answer)
-        found = "hang" if answer is None else f"crash {self._process.wait()}"
+        found = "hang" if answer is None else f"crash {self._process.wait()}\n{self._crash()}"
         self._end()
         self._start()
         return found
+
+    def _crash(self) -> str:
+        """Where the process crashed, as far as it could say."""
+        path = Path(self._folder.name) / CRASH_NAME
+        # Addresses are others each time, and the same crash is looked for again when it is made small.
+        return re.sub(r"0x[0-9a-f]+", "0x…", path.read_text(errors="replace")) if path.exists() else ""
 
     def _answer(self, seconds: float) -> str | None:
         """The next line; None if the process computed for that long without one, or waited for much longer."""

@@ -3,6 +3,7 @@
 """
 
 import contextlib
+import faulthandler
 import os
 import sys
 import tempfile
@@ -16,6 +17,9 @@ from tests.campaign.forks import read_stages_in_forks
 from tests.campaign.kinds import KINDS, written_input
 
 MEMORY_BYTES = 4 << 30
+CRASH_NAME = "crash.txt"
+"""The file in a worker's folder that says where it crashed."""
+
 MOST_MORE_BYTES = 320 << 20
 """Of memory that the highest mark rises by at an input, all of which are small."""
 
@@ -51,6 +55,7 @@ def answer_lines(try_one: Callable[..., str], folder: Path, seed: int) -> None:
 
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
     os.environ.setdefault("SPLAP_CACHE_DIR", tempfile.gettempdir())
+    faulthandler.enable((folder / CRASH_NAME).open("w"))
     print("ready", flush=True)
     for line in sys.stdin:
         kind, number, *left_out = line.strip().split(",")

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from splap_editor.core.pose import LARGEST_COORDINATE, SCALES, Pose
+from splap_editor.core.pose import SCALES, Pose
 from splap_editor.core.splats.rotations import quats_to_matrices
+from splap_editor.core.splats.splats import LARGEST_COORDINATE
 
 CENTER = np.array([1.0, -2.0, 0.5])
 

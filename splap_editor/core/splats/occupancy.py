@@ -13,7 +13,7 @@ from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.splats.main_subject import MainSubject, main_subject
 from splap_editor.core.splats.morton import morton_order
 from splap_editor.core.splats.rotations import quats_to_matrices
-from splap_editor.core.splats.splats import Splats
+from splap_editor.core.splats.splats import LARGEST_COORDINATE, Splats
 
 MIN_CONTRIBUTION = 1.0 / 255.0
 """Least opacity that a renderer with eight bits a channel can show."""
@@ -23,8 +23,9 @@ NEEDLE_FLOOR = 1e-4
 
 _BLOCK_ROWS = 1 << 15
 
-_LENGTHS = (1e-60, 1e60)
-"""Scales beyond these have squares that leave float64's range in products of four."""
+LENGTHS = (1e-60, LARGEST_COORDINATE)
+"""Scales below the first have squares that leave float64's range in products of four; no splat that is larger than
+coordinates may be has a place that could be drawn."""
 
 
 class InertReason(IntEnum):
@@ -246,11 +247,11 @@ def _inert_reasons(
     """Reason why each splat of a block is inert; where several hold, the one that says most about the file."""
     scales, opacities, quats = splats.scales[block], splats.opacities[block], splats.quats[block]
     reasons = np.zeros(len(scales), np.uint8)
-    reasons[sigmas[:, 0] < _LENGTHS[0]] = InertReason.ZERO_SIZE
+    reasons[sigmas[:, 0] < LENGTHS[0]] = InertReason.ZERO_SIZE
     reasons[thresholds >= 1.0] = InertReason.THRESHOLD
     reasons[min_contribution / opacities >= 1.0] = InertReason.TRANSPARENT
     reasons[~np.any(quats, axis=1)] = InertReason.ZERO_QUATERNION
-    finite = np.isfinite(opacities) & np.isfinite(thresholds) & (scales < _LENGTHS[1]).all(axis=1)
-    finite &= np.isfinite(quats).all(axis=1) & (np.abs(splats.means[block]) < _LENGTHS[1]).all(axis=1)
+    finite = np.isfinite(opacities) & np.isfinite(thresholds) & (scales < LENGTHS[1]).all(axis=1)
+    finite &= np.isfinite(quats).all(axis=1) & (np.abs(splats.means[block]) < LENGTHS[1]).all(axis=1)
     reasons[~finite] = InertReason.NON_FINITE
     return reasons

@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 from splap_editor.core.index_spaces import FileMask
 
+LARGEST_COORDINATE = 1e30
+"""Largest coordinate and size of a splat, and largest move of a handle, in world units."""
+
 
 @dataclass(frozen=True, eq=False)
 class Splats:

@@ -88,7 +88,9 @@ def flaws(posed: PosedSurface, rest_axes: NDArray[np.float32], epsilon: float) -
     nodes, growths = spikes(posed, rest_axes)
     alone = ~np.isin(nodes, np.concatenate([torn.pairs.ravel(), drawn.links.ravel()]))
     nodes, growths = nodes[alone], growths[alone]
-    lengths = 4.0 * np.sqrt(np.square(posed.axes[nodes]).sum(axis=2).max(axis=1, initial=0.0)) / posed.scale
+    lengths = (
+        4.0 * np.sqrt(np.square(posed.axes[nodes], dtype=np.float64).sum(axis=2).max(axis=1, initial=0.0)) / posed.scale
+    )
     signs = (
         _Signs("tear", torn.pairs, torn.gaps, _strains(posed, torn.pairs), torn.odds),
         _Signs("web", drawn.links, drawn.longer, _strains(posed, drawn.links), drawn.odds),

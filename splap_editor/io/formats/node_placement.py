@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.pose import LARGEST_COORDINATE
+from splap_editor.core.splats.splats import LARGEST_COORDINATE
 
 _EVEN = 1e-4
 """Off a rotation, entry by entry, from which on a node counts as stretching its splats."""

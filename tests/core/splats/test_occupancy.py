@@ -80,7 +80,7 @@ def test_each_reason_to_be_inert_is_told():
     thresholds[2] = 1.0
     quats[3] = 0.0
     scales[4] = -np.inf
-    opacities[5], scales[6, 0], quats[7, 2], scales[8, 1] = np.nan, np.nan, np.inf, 800.0
+    opacities[5], scales[6, 0], quats[7, 2], scales[8, 1] = np.nan, np.nan, np.inf, 70.0
     opacities[9], scales[10, 1], scales[11, 0] = np.inf, -np.inf, -1e10
     splats = replace(splats, logit_opacities=opacities, log_scales=scales, quats=quats, thresholds=thresholds)
     ellipses = occupancy_ellipses(splats)
