@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 
 def gathered(
-    indptr: NDArray[np.integer], rows: NDArray[np.integer]
+    indptr: NDArray[np.integer], which: NDArray[np.integer]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.integer]]:
     """Find where the entries of some rows stand.
 
@@ -13,7 +13,8 @@ def gathered(
     ----------
     indptr : (n + 1,) int
         Starts of n rows.
-    rows : (m,) int
+    which : (m,) int
+        Rows.
 
     Returns
     -------
@@ -24,8 +25,8 @@ def gathered(
     owners : (e,) int
         Row that each is of.
     """
-    starts, places = run_places(indptr[rows], indptr[np.asarray(rows) + 1])
-    return starts, places, np.repeat(rows, np.diff(starts))
+    starts, places = run_places(indptr[which], indptr[np.asarray(which) + 1])
+    return starts, places, np.repeat(which, np.diff(starts))
 
 
 def run_places(firsts: NDArray[np.integer], ends: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -39,7 +40,7 @@ def run_places(firsts: NDArray[np.integer], ends: NDArray[np.integer]) -> tuple[
 def with_rows(
     indptr: NDArray[np.integer],
     arrays: tuple[NDArray, ...],
-    rows: NDArray[np.integer],
+    which: NDArray[np.integer],
     new_starts: NDArray[np.integer],
     new_arrays: tuple[NDArray, ...],
 ) -> tuple[NDArray[np.int32], tuple[NDArray, ...]]:
@@ -51,8 +52,8 @@ def with_rows(
         Starts of n rows.
     arrays : tuple of (nnz, …) arrays
         Entries.
-    rows : (m,) int
-        Ascending, each once.
+    which : (m,) int
+        Rows, ascending, each once.
     new_starts : (m + 1,) int
         Starts of these rows in ``new_arrays``.
     new_arrays : tuple of (e, …) arrays
@@ -65,9 +66,9 @@ def with_rows(
         Of the same types as those given.
     """
     counts = np.diff(indptr)
-    counts[rows] = np.diff(new_starts)
+    counts[which] = np.diff(new_starts)
     starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
-    firsts, ends = indptr[rows], indptr[np.asarray(rows) + 1]
+    firsts, ends = indptr[which], indptr[np.asarray(which) + 1]
     return starts, tuple(
         with_runs(old, firsts, ends, new, new_starts) for old, new in zip(arrays, new_arrays, strict=True)
     )

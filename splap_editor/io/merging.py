@@ -188,12 +188,12 @@ def _united_name(name: str, columns: ColumnNames, n_own: int, n_rest: int) -> st
     return f"{columns.sh_rest}{channel * (n_rest // 3) + k}"
 
 
-def _table(name: str, types: dict[str, str], rows: np.ndarray, comments: list[str]) -> PlyTable:
+def _table(name: str, types: dict[str, str], records: np.ndarray, comments: list[str]) -> PlyTable:
     lines = ["ply", "format binary_little_endian 1.0", *(f"comment {comment}" for comment in comments)]
-    lines.append(f"element vertex {len(rows)}")
+    lines.append(f"element vertex {len(records)}")
     lines += [f"property {_TYPE_NAMES[code]} {column}" for column, code in types.items()]
     header = ply_header("\n".join([*lines, "end_header", ""]).encode("latin-1", "replace"), name)
-    return binary_table(name, header, rows.view(np.uint8))
+    return binary_table(name, header, records.view(np.uint8))
 
 
 def _plain_table(files: Sequence[SplatFile], n_scales: int, progress: Progress) -> tuple[PlyTable, list[str]]:

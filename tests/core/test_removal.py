@@ -71,5 +71,5 @@ def test_a_range_is_found_among_what_is_left(means):
 
 
 def test_a_row_beyond_the_file_is_refused(means):
-    with pytest.raises(ValueError, match="row 500, but the file has rows 0 to 499"):
+    with pytest.raises(ValueError, match="row 500 is named, but the file has rows 0 to 499"):
         picked_splats(PickedRows(np.array([1, 500])), means)
