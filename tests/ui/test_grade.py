@@ -1,7 +1,7 @@
 """Grading in the real window: sliders, the picture that follows, undo, session and export."""
 
 import numpy as np
-from PySide6.QtCore import QPoint, Qt
+from PySide6.QtCore import QCoreApplication, QEvent, QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QStyle, QStyleOptionSlider
 
@@ -30,7 +30,9 @@ def wait_graded(driver):
 
 
 def handle_of(slider):
-    """Middle of the part of a slider that is dragged."""
+    """Middle of the part of a slider that is dragged, once its form has been laid out."""
+    QCoreApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest)
+    QCoreApplication.processEvents()
     option = QStyleOptionSlider()
     slider.initStyleOption(option)
     return (
