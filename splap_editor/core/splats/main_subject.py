@@ -4,15 +4,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from splap_editor.core.progress import Progress, no_progress, part_of
-from splap_editor.core.splats.near_points import are_near, connected_labels, nearest_points
 from splap_editor.core.splats.smallest_box import smallest_box
 
 _SAMPLE = 40_000
 """So many splats tell where the subject is; more cost time and move its size by less than a spacing."""
 
-_BLOCK_ROWS = 1 << 11
+_BLOCK_ROWS = 1 << 13
 _K = 8
 _FAINT = 0.25
 """Share of the median opacity below which a splat is haze wherever it lies."""
@@ -150,39 +152,33 @@ def _sample(points: NDArray[np.float64], opacities: NDArray[np.float64], progres
 
 @dataclass(frozen=True, eq=False)
 class _Nearest:
-    """The ``_K`` nearest (n, ``_K``) of each point, how far the last is, and how many count the point among theirs."""
+    """The ``_K`` nearest of each point: as a graph, how far the last is, and how many count the point among theirs."""
 
-    neighbors: NDArray[np.int32]
+    graph: sparse.csr_array
     spacings: NDArray[np.float64]
     n_mutual: NDArray[np.integer]
-
-    def labels_among(self, where: NDArray[np.intp]) -> NDArray[np.intp]:
-        """Number of the clump of each of some points, which hang together by each other only."""
-        places = np.full(len(self.neighbors), -1, np.int32)
-        places[where] = np.arange(len(where))
-        ends = places[self.neighbors[where]].ravel()
-        starts = np.repeat(np.arange(len(where), dtype=np.int32), _K)
-        is_edge = ends >= 0
-        return connected_labels(len(where), starts[is_edge], ends[is_edge])
 
 
 def _nearest(points: NDArray[np.float64], progress: Progress) -> _Nearest:
     n = len(points)
-    distances, found = nearest_points(points, _K + 1, part_of(progress, 0.0, 0.7))
-    neighbors = found[:, 1:].astype(np.int32)
-    n_mutual = np.empty(n, np.intp)
+    tree = cKDTree(points)
+    progress(0.2)
+    distances, neighbors = np.empty((n, _K + 1)), np.empty((n, _K + 1), np.intp)
     for lo in range(0, n, _BLOCK_ROWS):
-        progress(0.7 + 0.3 * lo / n)
-        rows = np.arange(lo, min(lo + _BLOCK_ROWS, n))
-        n_mutual[rows] = (neighbors[neighbors[rows]] == rows[:, None, None]).any(axis=2).sum(axis=1)
-    return _Nearest(neighbors, distances[:, -1], n_mutual)
+        progress(0.2 + 0.3 * lo / n)
+        block = slice(lo, lo + _BLOCK_ROWS)
+        distances[block], neighbors[block] = tree.query(points[block], _K + 1)
+    progress(0.5)
+    row_ends = np.arange(0, n * _K + 1, _K)
+    graph = sparse.csr_array((np.ones(n * _K, np.int32), neighbors[:, 1:].ravel(), row_ends), shape=(n, n))
+    return _Nearest(graph, distances[:, -1], graph.multiply(graph.T).sum(axis=1))
 
 
 def _subject_of(points: NDArray[np.float64], near: _Nearest, progress: Progress) -> NDArray[np.bool_]:
     """Which points the subject is made of."""
     n = len(points)
     where = np.flatnonzero(_is_solid(near))
-    labels = near.labels_among(where)
+    _, labels = connected_components(near.graph[where][:, where], directed=False)
     is_part = np.bincount(labels, minlength=1) >= max(_K, _SPECK * len(where))
     where, labels = where[is_part[labels]], labels[is_part[labels]]
     chosen = np.zeros(n, bool)
@@ -223,7 +219,7 @@ def _parts_beside(
     """
     is_coherent = ~chosen & (near.spacings <= _COHERENT * size) & (near.n_mutual >= _MUTUAL)
     where = np.flatnonzero(is_coherent)
-    labels = near.labels_among(where)
+    _, labels = connected_components(near.graph[where][:, where], directed=False)
     n_all = np.bincount(labels, minlength=1)
     n_near = np.bincount(labels, is_near[where], minlength=1)
     is_part = (n_all >= max(_K, _SEEN * chosen.sum())) & (n_near >= 0.9 * n_all)
@@ -245,7 +241,8 @@ def _grown(points: NDArray[np.float64], labels: NDArray[np.integer], inside: NDA
         center = points[inside].mean(axis=0)
         gap = _GAP * np.sqrt(np.square(points[inside] - center).sum(axis=1).max())
         rest = np.flatnonzero(~inside)
-        newest = np.isin(labels, labels[rest[are_near(points[rest], points[newest], gap)]])
+        distances, _ = cKDTree(points[newest]).query(points[rest], distance_upper_bound=gap)
+        newest = np.isin(labels, labels[rest[np.isfinite(distances)]])
         if not newest.any():
             return inside
         inside = inside | newest

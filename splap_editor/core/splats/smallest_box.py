@@ -4,9 +4,9 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from splap_editor.core.progress import Progress, no_progress, part_of
-from splap_editor.core.splats.rotations import quats_to_matrices
 
 _N_SUPPORTS = 100
 """Directions an octant in which the outermost points are looked for: 5 degrees apart."""
@@ -84,15 +84,7 @@ def _best_frame(points: NDArray[np.float64], progress: Progress) -> NDArray[np.f
 def _starts() -> NDArray[np.float64]:
     """Rotations about 15 degrees apart, as far as a box can tell them apart."""
     angles = np.linspace(-0.25 * np.pi, 0.25 * np.pi, 7)
-    return rotations_about(np.array(list(product(angles, repeat=3))))
-
-
-def rotations_about(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n, 3, 3) rotations about vectors (n, 3), by as many radians as they are long."""
-    angles = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
-    # sin(x / 2) / x is sinc's, which knows its limit.
-    halves = 0.5 * np.sinc(angles / (2.0 * np.pi))
-    return quats_to_matrices(np.column_stack([np.cos(0.5 * angles), halves[:, None] * vectors]))
+    return Rotation.from_rotvec(np.array(list(product(angles, repeat=3)))).as_matrix()
 
 
 def _descended(
@@ -101,7 +93,7 @@ def _descended(
     """Least sum of widths near a frame, and where; the sum has kinks there, so no gradient is asked."""
     reach, least = 0.15, float(_sums(points, frame[None])[0])
     for _ in range(_MOST_STEPS):
-        frames = frame @ rotations_about(reach * steps)
+        frames = frame @ Rotation.from_rotvec(reach * steps).as_matrix()
         sums = _sums(points, frames)
         k = int(np.argmin(sums))
         if sums[k] < least:
