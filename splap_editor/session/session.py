@@ -158,7 +158,8 @@ class Session:
         self._runner.stop_opening()
 
     def export(self, path: Path, *, as_3dgs: bool = False, columns: tuple[str, ...] = ()) -> None:
-        """Write the splats on screen, once they have settled, as a PLY."""
+        """Write the splats on screen, once they have settled, for which work that was halted goes on."""
+        self._ledger.is_halted = False
         self._ledger.exports += (ExportOrder(path, columns, as_3dgs),)
         self._runner.advance()
 

@@ -272,6 +272,16 @@ def test_every_job_can_be_cancelled_and_leaves_everything_as_it_was(kind, main, 
     main.run_until(lambda: opened.state == "settled")
 
 
+def test_an_export_after_a_cancel_goes_on_with_what_was_halted(main, opened, tmp_path):
+    bent(main, opened)
+    opened.halt()
+    assert opened.state == "halted"
+    opened.export(tmp_path / "out.ply")
+    main.run_until((tmp_path / "out.ply").exists)
+    main.run_until(lambda: opened.state == "settled")
+    assert opened.failures == []
+
+
 def test_a_full_disk_is_said_and_the_old_file_stays(main, opened, monkeypatch, tmp_path):
     bent(main, opened)
     out = tmp_path / "out.ply"
