@@ -65,6 +65,8 @@ def in_turn(parts: Sequence[Callable[[Progress], Result]], told: Callable[[Seque
     shares = [0.0] * len(parts)
 
     def progress_of(number: int) -> Progress:
+        """Progress of one part."""
+
         def progress(share: float) -> None:
             shares[number] = share
             told(shares)

@@ -1,7 +1,6 @@
 """A session shown in a viewport: it follows the scene's signals, and has colours and order made for each view."""
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
 from itertools import chain
 
 import numpy as np
@@ -12,7 +11,6 @@ from splap_editor.core.index_spaces import FileRows, RowsByPlace
 from splap_editor.core.options import world_length
 from splap_editor.core.reach_options import ReachOptions
 from splap_editor.core.splats.rotations import quats_to_matrices
-from splap_editor.core.splats.spherical_harmonics import view_colors
 from splap_editor.core.splats.splats import Splats
 from splap_editor.engine.edit import PIN_COLOR, Handle
 from splap_editor.engine.grading import Grading
@@ -23,10 +21,9 @@ from splap_editor.session.pivot import Pivot, pivot_point
 from splap_editor.session.scene import Scene
 from splap_editor.session.scene_follower import SceneFollower
 from splap_editor.session.session import Session
-from splap_editor.viewport.contribution import Contribution, contribution
+from splap_editor.viewport.depiction import Depiction, Presented, SeenFrom, depiction, graded_depiction, presented
 from splap_editor.viewport.depth_order import depth_order
 from splap_editor.viewport.gizmo import Claim
-from splap_editor.viewport.glyphs import Glyphs, base_colors, splat_glyphs
 from splap_editor.viewport.overlays import Mark, MarkShape, circle
 from splap_editor.viewport.projection import Projection
 from splap_editor.viewport.splat_actor import DisplayMode, SplatFlag
@@ -36,90 +33,6 @@ from splap_editor.viewport.weight_view import WeightView
 
 REMOVED_TINT = (229, 72, 77, 190)
 FREE_RING_COLOR = (0.75, 0.77, 0.82)
-
-
-@dataclass(frozen=True, eq=False)
-class SeenFrom:
-    """From where, and how, splats are looked at.
-
-    Parameters
-    ----------
-    eye : (3,) float64
-        World position of the camera.
-    direction : (3,) float32
-        Unit vector into the scene.
-    is_blended : bool
-        The drawing order matters.
-    """
-
-    eye: NDArray[np.float64]
-    direction: NDArray[np.float32]
-    is_blended: bool
-
-
-@dataclass(frozen=True, eq=False)
-class Presented:
-    """What the worker made for one view of the splats: drawing order and colours, None where neither is wanted."""
-
-    order: RowsByPlace | None
-    colors: NDArray[np.uint8] | None
-
-
-@dataclass(frozen=True, eq=False)
-class Depiction:
-    """What drawing a scene needs of its file, made once by the worker that opens it.
-
-    Parameters
-    ----------
-    rest : Glyphs
-        Shapes at rest.
-    colors : (N, 4) uint8
-        Colours that do not depend on the view, and opacities.
-    by_contribution : Contribution
-        Which splats give most.
-    sh0, shN : (N, 3), (N, K, 3) float32
-        Coefficients in the order in memory that reading them wants; empty where no colour depends on the view.
-    """
-
-    rest: Glyphs
-    colors: NDArray[np.uint8]
-    by_contribution: Contribution
-    sh0: NDArray[np.float32]
-    shN: NDArray[np.float32]
-
-
-def depiction(splats: Splats) -> Depiction:
-    """Make shapes and colours of a scene at rest."""
-    has_view = splats.shN.shape[1] > 0
-    sh0 = np.ascontiguousarray(splats.sh0, np.float32) if has_view else np.empty((0, 3), np.float32)
-    shN = np.ascontiguousarray(splats.shN, np.float32) if has_view else np.empty((0, 0, 3), np.float32)
-    rest, colors = splat_glyphs(splats), base_colors(splats)
-    return Depiction(rest, colors, contribution(rest, colors), sh0, shN)
-
-
-def graded_depiction(depicted: Depiction, splats: Splats) -> Depiction:
-    """Take the colours of graded splats; shapes and who gives most stay those of the file."""
-    has_view = splats.shN.shape[1] > 0
-    sh0 = np.ascontiguousarray(splats.sh0, np.float32) if has_view else depicted.sh0
-    shN = np.ascontiguousarray(splats.shN, np.float32) if has_view else depicted.shN
-    return replace(depicted, colors=base_colors(splats), sh0=sh0, shN=shN)
-
-
-def presented(depicted: Depiction, kernels: AdaptedKernels | None, seen: SeenFrom) -> Presented:
-    """Sort and colour splats for a view; for the worker."""
-    means = _rest_means(depicted) if kernels is None else kernels.means_f32
-    order = depth_order(means, seen.direction) if seen.is_blended else None
-    if not len(depicted.shN):
-        return Presented(order, None)
-    rotations = np.broadcast_to(np.eye(3), (len(means), 3, 3)) if kernels is None else kernels.rotations
-    rgb = view_colors(depicted.sh0, depicted.shN, means, rotations, seen.eye)
-    np.nan_to_num(rgb, copy=False)
-    np.minimum(rgb, 1.0, out=rgb)
-    rgb *= 255.0
-    rgb += 0.5
-    colors = depicted.colors.copy()
-    colors[:, :3] = rgb
-    return Presented(order, colors)
 
 
 class SceneView:
@@ -500,7 +413,7 @@ class SceneView:
 
         def present(job: Job) -> tuple[Presented, RowsByPlace | None]:
             made = presented(depicted, kernels, seen)
-            return made, depth_order(_rest_means(depicted), seen.direction) if sorts_original else None
+            return made, depth_order(depicted.rest_means, seen.direction) if sorts_original else None
 
         def done(both: tuple[Presented, RowsByPlace | None]) -> None:
             if self._shown is not scene:
@@ -530,10 +443,6 @@ def _marks_of_edit(scene: Scene) -> list[Mark]:
     if scene.pivot is Pivot.POINT and scene.pivot_at is not None:
         marks.append(Mark(scene.pivot_at, (255, 255, 255), MarkShape.CROSS))
     return marks
-
-
-def _rest_means(depicted: Depiction) -> NDArray[np.float32]:
-    return np.ascontiguousarray(depicted.rest.means, np.float32)
 
 
 def suggested_up(splats: Splats) -> tuple[float, float, float]:

@@ -254,6 +254,7 @@ def adapted_splats(splats: Splats, adapted: AdaptedKernels, progress: Progress =
     changed = adapted.changed
 
     def replaced(old, new):
+        """A copy of (N, …) old values with the changed rows new."""
         result = np.array(old)
         result[changed] = new[changed]
         return result

@@ -56,6 +56,7 @@ class ConvergedArap(ArapDeformer):
         minimiser = ArapMinimiser(problem, Pose(start.positions[problem.nodes], start.rotations[problem.nodes]))
 
         def settled(residual: float) -> Deformation:
+            """What the minimiser has come to, with what is held in its place."""
             whole = self._held_pose(transforms)
             problem.spread(minimiser.pose, whole)
             return self._finished(whole, transforms, residual, minimiser.n_iterations)

@@ -42,6 +42,7 @@ def _solved(
     shared = time.perf_counter() - began
 
     def told(shares: Sequence[float]) -> None:
+        """Tell how far the weights are, as the mean of the handles' shares."""
         progress = binding.progress if binding.stages is None else binding.stages(_words(shares))
         progress(0.1 + 0.9 * float(np.mean(shares)))
 

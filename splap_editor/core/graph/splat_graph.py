@@ -156,6 +156,7 @@ def mended_graph(ellipses: Ellipses, graph: SplatGraph, options: GraphOptions) -
     added = np.stack(np.divmod(come, n), axis=1).astype(np.int32)
 
     def entries(old: NDArray[np.float64], new: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values of what stays and of what comes, either way round, in the order of their keys."""
         return np.concatenate([old[places], new, new])[order]
 
     old: list[NDArray] = [graph.indices, graph.lengths]

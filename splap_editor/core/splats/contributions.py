@@ -121,6 +121,7 @@ def contributions(
     trained_blur = _BLUR * min(1.0, subject.size / _TRAINED_WIDTH / pixel) ** 2
 
     def pictures(number: int, progress: Progress) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Weights and peaks, (n_seen,) each, of the splats that the two pictures along one direction show."""
         columns, lines = np.ceil(2.0 * extents[number] / pixel).astype(int)
         first = number % n_shared
         n_seen = -(-(len(scene) - first) // n_shared)

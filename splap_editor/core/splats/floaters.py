@@ -68,6 +68,7 @@ def floaters(splats: Splats, ellipses: Ellipses, *, stages: StageProgress = sile
     margins, reasons = np.empty(len(evidence)), np.empty(len(evidence), np.int8)
 
     def weigh(first: int, end: int, progress: Progress) -> None:
+        """Weigh the evidence of nodes first to end - 1."""
         # Block by block, so that what is worked on stays in the cache.
         for lo in range(first, end, _BLOCK_NODES):
             progress((lo - first) / (end - first))

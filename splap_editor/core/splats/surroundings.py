@@ -143,6 +143,7 @@ def surroundings(ellipses: Ellipses, *, progress: Progress = no_progress, run: R
     known = neighbors, distances, centers, ellipses.semi_axes, ellipses.normals, reaches, bounded_logits(ellipses)
 
     def look(first: int, end: int, progress: Progress) -> None:
+        """Take what is told by the surroundings of nodes first to end - 1."""
         _local(first, end, *known, np.array(STRAY), local, ties)
 
     in_parts(look, n, part_of(progress, 0.75, 1.0), run)
@@ -165,6 +166,7 @@ def nearest(
     tree = cKDTree(centers, balanced_tree=False)
 
     def search(first: int, end: int, progress: Progress) -> None:
+        """Find the neighbours of nodes first to end - 1."""
         for lo in range(first, end, _BLOCK_NODES):
             some = slice(lo, min(lo + _BLOCK_NODES, end))
             found, at = tree.query(centers[some], k + 1)

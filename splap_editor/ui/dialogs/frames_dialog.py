@@ -101,6 +101,20 @@ class FramesDialog(QDialog):
         buttons.accepted.connect(self._ask_for_path)
         buttons.rejected.connect(self.reject)
         self._rows: dict[str, tuple[QWidget, ...]] = {}
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(5 * STEP, 5 * STEP, 5 * STEP, 4 * STEP)
+        layout.setSpacing(4 * STEP)
+        layout.addLayout(self._form())
+        layout.addWidget(self.choice)
+        layout.addWidget(self.note)
+        layout.addStretch(1)
+        layout.addWidget(buttons)
+        self.kind.currentIndexChanged.connect(self._show)
+        self.kind.setCurrentIndex(0 if timeline.keys else 1 if timeline.camera_keys else 2)
+        self._show()
+
+    def _form(self) -> QGridLayout:
+        """What is asked for, a row each."""
         grid = QGridLayout()
         grid.setHorizontalSpacing(3 * STEP)
         grid.setVerticalSpacing(2 * STEP)
@@ -109,17 +123,7 @@ class FramesDialog(QDialog):
         self._add_row(grid, "number", "Pictures", self.number)
         self._add_row(grid, "size", "Size", self.width_field, PlainLabel("×"), self.height_field)
         self._add_row(grid, "transparent", "", self.transparent)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(5 * STEP, 5 * STEP, 5 * STEP, 4 * STEP)
-        layout.setSpacing(4 * STEP)
-        layout.addLayout(grid)
-        layout.addWidget(self.choice)
-        layout.addWidget(self.note)
-        layout.addStretch(1)
-        layout.addWidget(buttons)
-        self.kind.currentIndexChanged.connect(self._show)
-        self.kind.setCurrentIndex(0 if timeline.keys else 1 if timeline.camera_keys else 2)
-        self._show()
+        return grid
 
     def _add_row(self, grid: QGridLayout, name: str, text: str, *widgets: QWidget) -> None:
         label = form_label(text, widgets[0])
