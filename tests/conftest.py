@@ -44,6 +44,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         item.add_marker(kind)
 
 
+def pytest_collection_finish() -> None:
+    """Take what modules hold out of every later collection of garbage."""
+    gc.collect()
+    gc.freeze()
+
+
 @pytest.fixture(autouse=True)
 def fixed_seeds() -> None:
     """Give code that draws from the global generators the same numbers in every run."""
@@ -107,6 +113,9 @@ def no_leaked_vtk() -> Iterator[None]:
     gc.collect()
     leaked = [type(window()).__name__ for window in _render_windows() if window not in before]
     assert not leaked, f"VTK render windows left alive: {', '.join(leaked)}"
+    # What outlives a test belongs to modules. Hundreds of thousands of those objects, gone through at every collection
+    # and every search for what was left, would take a second of each test.
+    gc.freeze()
 
 
 def _render_windows() -> set[weakref.ref]:

@@ -286,10 +286,6 @@ class MainWindow(FileDrop, QMainWindow):
         self.display_panel = DisplayPanel(self.display, self.actions_)
         self.scene_panel = ScenePanel(self.session)
         self.scene_panel.reread.connect(self.files.reread)
-        page = QWidget()
-        stack = QVBoxLayout(page)
-        stack.setContentsMargins(0, 0, 0, 0)
-        stack.setSpacing(0)
         panels = {
             "Handles": self.handles_panel,
             "Deformer": self.deformer_panel,
@@ -300,22 +296,27 @@ class MainWindow(FileDrop, QMainWindow):
             **dict(self.inspection.panels),
             "Scene": self.scene_panel,
         }
-        sections = {title: Section(title, panel) for title, panel in panels.items()}
+        self.dock.setTitleBarWidget(QWidget())
+        self.dock.setFeatures(QDockWidget.DockWidgetFeature.NoDockWidgetFeatures)
+        self.dock.toggleViewAction().setVisible(False)
+        self.addDockWidget(Qt.DockWidgetArea.RightDockWidgetArea, self.dock)
+        # Whatever gets a parent is styled anew with all that it holds: the panels come last.
+        scroll = QScrollArea(widgetResizable=True)
+        self.dock.setWidget(scroll)
+        page = QWidget()
+        scroll.setWidget(page)
+        stack = QVBoxLayout(page)
+        stack.setContentsMargins(0, 0, 0, 0)
+        stack.setSpacing(0)
+        sections = {title: Section(title, panel, parent=page) for title, panel in panels.items()}
         for section in sections.values():
             stack.addWidget(section)
         self.floaters_section = sections["Floaters"]
         self.floaters_section.setVisible(False)
         stack.addStretch(1)
-        scroll = QScrollArea(widgetResizable=True)
         scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        scroll.setWidget(page)
         # Nothing of a panel is cut off at the side.
         scroll.setMinimumWidth(page.minimumSizeHint().width() + scroll.verticalScrollBar().sizeHint().width())
-        self.dock.setTitleBarWidget(QWidget())
-        self.dock.setFeatures(QDockWidget.DockWidgetFeature.NoDockWidgetFeatures)
-        self.dock.setWidget(scroll)
-        self.dock.toggleViewAction().setVisible(False)
-        self.addDockWidget(Qt.DockWidgetArea.RightDockWidgetArea, self.dock)
         self.resizeDocks([self.dock], [304], Qt.Orientation.Horizontal)
 
     # ---------------------------------------------------------------- state

@@ -1,6 +1,6 @@
 """Real windows under Xvfb: one per test, with settings of its own, closed at its end."""
 
-import gc
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -150,14 +150,23 @@ def empty_window(qapp: QApplication, qtbot, no_leaked_vtk, request) -> Iterator[
     # pytest holds on to a test's arguments until after the check for what was leaked.
     for name in ("empty_window", "driver"):
         request.node.funcargs.pop(name, None)
-    gc.collect()
+
+
+@pytest.fixture(scope="session")
+def prepared(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder for what the first window makes of the tube; the others find it in their own."""
+    return tmp_path_factory.mktemp("prepared")
 
 
 @pytest.fixture
-def driver(empty_window: MainWindow, qtbot) -> Driver:
+def driver(empty_window: MainWindow, qtbot, own_cache: Path, prepared: Path) -> Driver:
     """A person, the tube open and prepared."""
+    scenes = own_cache / "scenes"
+    shutil.copytree(prepared, scenes, dirs_exist_ok=True)
     person = Driver(empty_window, qtbot)
     person.open(resource("samples", "tube.ply"))
     person.wait_idle()
     person.wait_frame()
+    if not any(prepared.iterdir()):
+        shutil.copytree(scenes, prepared, dirs_exist_ok=True)
     return person

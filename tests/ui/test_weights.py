@@ -157,14 +157,6 @@ def test_the_panel_says_how_good_the_weights_are_and_what_they_do_not_reach(driv
     assert "moves only its own splats" in line
 
 
-def test_progress_names_the_handle(driver):
-    stages = []
-    driver.session.told_job.changed.connect(lambda job: stages.append(job.stage) if job is not None else None)
-    placed(driver, shares=(0.1, 0.5, 0.9))
-    named = [stage for stage in stages if stage.startswith("weights: handle ")]
-    assert named and all(" of " in stage and stage.endswith(" %") for stage in named)
-
-
 def test_the_same_recipe_gives_the_same_splats_from_window_and_command_line(driver, tmp_path):
     handles = placed(driver)
     driver.session.drag.preview({handles[1].handle_id: Pose((0.0, 0.3, 0.1), (0.9, 0.1, 0.3, 0.3), 1.2)})

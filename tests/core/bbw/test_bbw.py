@@ -1,4 +1,6 @@
+import re
 from itertools import pairwise
+from types import SimpleNamespace
 
 import igl
 import numpy as np
@@ -6,8 +8,10 @@ import pytest
 import scipy.sparse as sp
 
 from splap_editor.core.bbw.bbw import BbwDeformer, bbw_weights
+from splap_editor.core.bbw.binding import bind_bbw
 from splap_editor.core.bbw.options import BbwOptions
 from splap_editor.core.bbw.weights import bbw_problem, handle_weight
+from splap_editor.core.binding import Binding
 from splap_editor.core.deformer import Handles
 from splap_editor.core.progress import Cancelled
 from tests.reference.bbw import handles_of, mesh_graph, operators, rigid, sheet, tube, weights_dense
@@ -47,6 +51,18 @@ def test_weights_equal_the_dense_reference(cage):
         np.testing.assert_allclose(weight, expected[:, h], atol=1e-6)
         assert not solved.qp.fallback
         assert solved.qp.kkt_residual < 1e-8
+
+
+def test_progress_names_the_handle_that_is_worked_on():
+    points, triangles, handles = three_handles()
+    L, M = operators(points, triangles)
+    surface = SimpleNamespace(rest=points, L=L, M=M, graph=mesh_graph(points, L))
+    told = []
+    bind_bbw(surface, handles, EXACT, Binding(stages=lambda words: lambda share: told.append((words, share))))
+    named = [re.fullmatch(r"weights: handle (\d) of 3, (\d+) %", words) for words, _ in told]
+    assert all(named)
+    first = [int(match[1]) for match in named]
+    assert first == sorted(first) and set(first) == {1, 2, 3}
 
 
 def test_default_tolerance_is_within_the_weight_error_of_the_optimum():
