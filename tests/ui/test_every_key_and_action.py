@@ -108,9 +108,21 @@ def prepared(driver, spec, edit):
     QCoreApplication.processEvents()
 
 
-def slow_frame(*_):
-    """Take as long for a frame as a large scene does without a graphics card."""
-    sleep(0.3)
+class SlowFrames:
+    """Take as long for a frame, while ``on``, as a large scene does without a graphics card."""
+
+    def __init__(self, driver, seconds):
+        self.on, self.seconds, self._viewport = False, seconds, driver.window.viewport
+        self._viewport.frame_drawn.connect(self._drawn)
+
+    def begin(self):
+        """Be slow from the frame on that is drawn next, which is soon."""
+        self.on = True
+        self._viewport.update()
+
+    def _drawn(self, _):
+        if self.on:
+            sleep(self.seconds)
 
 
 def close_what_opened(driver):
@@ -126,8 +138,7 @@ def close_what_opened(driver):
 @pytest.mark.parametrize("how", ["key", "click", "key while frames are slow"])
 def test_every_action_has_an_effect(driver, how):
     window, edit = driver.window, base_edit(driver)
-    if "slow" in how:
-        window.viewport.frame_drawn.connect(slow_frame)
+    slow = SlowFrames(driver, 0.3 if "slow" in how else 0.0)
     how = how.split()[0]
     driver.wait_idle()
     dead = []
@@ -135,6 +146,7 @@ def test_every_action_has_an_effect(driver, how):
     for spec, keys in ways:
         if spec.action_id in ELSEWHERE:
             continue
+        slow.on = False
         close_what_opened(driver)
         prepared(driver, spec, edit)
         action = window.actions_[spec.action_id]
@@ -142,6 +154,7 @@ def test_every_action_has_an_effect(driver, how):
         if not action.isEnabled():
             dead.append(f"{spec.action_id} is off")
             continue
+        slow.begin()
         if how == "key":
             pressed = QKeySequence(keys)[0]
             QTest.keyClick(window.viewport, pressed.key(), pressed.keyboardModifiers())
@@ -151,6 +164,7 @@ def test_every_action_has_an_effect(driver, how):
             driver.qtbot.waitUntil(lambda before=before: seen(driver) != before, timeout=WAIT_MS)
         except driver.qtbot.TimeoutError:
             dead.append(f"{spec.action_id} {keys}")
+    slow.on = False
     close_what_opened(driver)
     driver.session.halt()
     assert dead == []
@@ -248,8 +262,9 @@ def ready_for(driver, name, row, text):
 def test_every_key_of_a_tool_has_an_effect(driver, frame_s):
     edit, window, dead, seen_keys = base_edit(driver), driver.window, [], 0
     driver.wait_idle()
-    window.viewport.frame_drawn.connect(lambda _: sleep(frame_s))
+    slow = SlowFrames(driver, frame_s)
     for name, row, text in tool_keys():
+        slow.on = False
         window.tools.cancel()
         driver.scene.set_edit(edit)
         driver.scene.set_active_handles((edit.handles[0].handle_id,))
@@ -257,11 +272,13 @@ def test_every_key_of_a_tool_has_an_effect(driver, frame_s):
         driver.wait_idle()
         ready_for(driver, name, row, text)
         before = tool_state(driver)
+        slow.begin()
         pressed = QKeySequence(text.removeprefix("Any+").replace("Number", "7"))[0]
         driver.key(pressed.key(), pressed.keyboardModifiers())
         seen_keys += 1
         if tool_state(driver) == before:
             dead.append(f"{name}: {text}")
+    slow.on = False
     window.tools.cancel()
     driver.session.halt()
     assert seen_keys > 20 and dead == []
