@@ -130,6 +130,8 @@ def main() -> None:
     QSettings.setDefaultFormat(QSettings.Format.IniFormat)
     QSettings.setPath(QSettings.Format.IniFormat, QSettings.Scope.UserScope, os.path.join(folder, "settings"))
     apply_theme(app)
+    # As in the program, windows are freed on their own thread alone: a worker that happens to collect would crash Qt.
+    gc.disable()
     answer_lines(tried, Path(folder), int(sys.argv[1]))
 
 
