@@ -35,20 +35,25 @@ from tests.benchmark.paper_tables import scene_of as scene_name
 from tests.benchmark.peers import note
 
 SHOWN = ("oracle", "ours", "paper", "knn10", "mahalanobis10", "mani-gs", "sugar", "cage")
-SIZE = 300, 260
+SIZE = 420, 340
+N_COLUMNS = 3
 CAPTION_PX = 22
+NEAR = 0.2
+"""Distance from a handle, in s, within which what is there is turned towards the eye."""
 
 
 def view_of(focus: NDArray[np.float64], pull: Pull, truth: GroundTruth) -> View:
-    """Look at a pull across its direction, from outside the object."""
-    along = pull.move / np.linalg.norm(pull.move)
-    out = focus - 0.5 * (truth.vertices.min(axis=0) + truth.vertices.max(axis=0)) + [1e-3, -2e-3, 1e-3]
-    side = out - (out @ along) * along
-    side /= np.linalg.norm(side)
-    up = np.cross(side, along)
+    """Look at a pull from outside the object, square to how the parts around it lie and move, so that they part in view."""
+    near = truth.vertices[np.linalg.norm(truth.vertices - pull.center, axis=1) < NEAR * truth.size]
+    spread = np.concatenate([near, near + pull.move]) - focus
+    side = np.linalg.svd(spread, full_matrices=False)[2][2]
+    out = focus - 0.5 * (truth.vertices.min(axis=0) + truth.vertices.max(axis=0))
+    side = side if side @ out >= 0.0 else -side
     # A little from aside, so that what lies behind each other is seen.
-    eye = focus + 1.5 * truth.size * (side + 0.35 * up + 0.35 * along)
-    return View(eye, focus, along if abs(along[2]) > 0.5 else np.array([0.0, 0.0, 1.0]))
+    up = np.eye(3)[np.argmin(np.abs(side[[1, 2]])) + 1]
+    across = np.cross(up, side) / np.linalg.norm(np.cross(up, side))
+    eye = focus + 1.2 * truth.size * (side + 0.3 * across + 0.2 * up)
+    return View(eye, focus, up)
 
 
 @contextmanager
@@ -104,13 +109,14 @@ def strip(case: Case, number: int, solver: str, n_pulls: int, shown: Sequence[st
         handle, _ = held(scene.truth.vertices_of(bound.rest), bound.rest, pull, scene.truth.size)
         deformation = deformed(solver, bound, handle, pull, scene.truth.size)
         panels.append((METHODS[name].title, picture_of(posed(scene, bound, deformation), view)))
-    width, height = SIZE
-    sheet = Image.new("RGB", (width * len(panels), height + CAPTION_PX), "white")
+    width, height = SIZE[0], SIZE[1] + CAPTION_PX
+    sheet = Image.new("RGB", (width * N_COLUMNS, height * -(-len(panels) // N_COLUMNS)), "white")
     pen = ImageDraw.Draw(sheet)
     for place, (title, pixels) in enumerate(panels):
+        row, column = divmod(place, N_COLUMNS)
         drawn = Image.fromarray(pixels, "RGBA")
-        sheet.paste(drawn, (place * width, CAPTION_PX), drawn)
-        pen.text((place * width + 6, 4), title, fill="black")
+        sheet.paste(drawn, (column * width, row * height + CAPTION_PX), drawn)
+        pen.text((column * width + 6, row * height + 4), title, fill="black")
     return sheet
 
 
