@@ -43,7 +43,7 @@ NEAR = 0.2
 
 
 def view_of(focus: NDArray[np.float64], pull: Pull, truth: GroundTruth) -> View:
-    """Look at a pull from outside the object, square to how the parts around it lie and move, so that they part in view."""
+    """Look at a pull from outside the object, square to how what is around it lies and moves: parts part in view."""
     near = truth.vertices[np.linalg.norm(truth.vertices - pull.center, axis=1) < NEAR * truth.size]
     spread = np.concatenate([near, near + pull.move]) - focus
     side = np.linalg.svd(spread, full_matrices=False)[2][2]
