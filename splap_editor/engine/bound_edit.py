@@ -250,7 +250,7 @@ def bound_file(
     with_surface: bool = False,
 ) -> tuple[Surface | None, BoundEdit | None]:
     """Make the surface of a file and bind an edit to it, as far as needed; parameters as of `posed`."""
-    if not edit.active_handles and not with_surface and not edit.grading.needs_surface:
+    if not edit.needs_surface and not with_surface:
         return None, None
     surface = surface_of(file.splats, edit.graph, removed=edit.removed, cache=cache, stages=stages)
     if not edit.active_handles:

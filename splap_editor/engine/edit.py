@@ -137,6 +137,11 @@ class Edit(BaseEdit[Handle, Pin]):
         return is_at_rest and self.removed is None and self.place.is_identity and self.grading.is_identity
 
     @property
+    def needs_surface(self) -> bool:
+        """Whether splats cannot be written without the surface: a handle holds some, or a grade fades along it."""
+        return bool(self.active_handles) or self.grading.needs_surface
+
+    @property
     def has_work(self) -> bool:
         """Whether there is anything a person made: handles and pins are work before anything is moved by them."""
         graph = self.graph

@@ -33,6 +33,9 @@ class ExportReport:
         Everything was moved, turned or scaled as one body.
     is_graded : bool
         Colours or opacities were changed.
+    form : str
+        What all splats were brought to, changed or not: "as .spz holds them"; empty where rows that did not change
+        stand as they were.
     check : DeformationCheck, optional
         What the pose spoils, where it was looked at.
     """
@@ -45,10 +48,11 @@ class ExportReport:
     n_removed: int = 0
     is_placed: bool = False
     is_graded: bool = False
+    form: str = ""
     check: "DeformationCheck | None" = None
 
     def __str__(self) -> str:
-        kept = "none of them moved" if self.is_graded else "unchanged"
+        kept = "none of them moved" if self.is_graded or self.form else "unchanged"
         parts = [f"{self.path.name}: {self.n_splats:,} splats, {kept}"]
         if self.n_changed:
             parts = [
@@ -59,6 +63,7 @@ class ExportReport:
         parts += [f"{self.n_removed:,} removed"] if self.n_removed else []
         parts += ["all of them put in their place"] if self.is_placed else []
         parts += ["colours graded"] if self.is_graded else []
+        parts += [self.form] if self.form else []
         parts += [f"look at {self.check}"] if self.check is not None and self.check.places else []
         return ", ".join(parts)
 
@@ -68,14 +73,18 @@ def export_report(
     splats: Splats,
     kernels: AdaptedKernels | None,
     edit: Edit,
+    form: str = "",
     check: "DeformationCheck | None" = None,
 ) -> ExportReport:
-    """Compare adapted kernels with the splats they came from, before these are put in their place."""
+    """Compare adapted kernels with the splats they came from, before these are put in their place.
+
+    ``form`` and ``check`` are those of the report.
+    """
     n_removed = edit.removal.n_removed
     n_written = splats.n_splats - n_removed
     is_placed, is_graded = not edit.place.is_identity, not edit.grading.is_identity
     if kernels is None or not kernels.changed.any():
-        return ExportReport(path, n_written, 0, 0.0, 1.0, n_removed, is_placed, is_graded, check)
+        return ExportReport(path, n_written, 0, 0.0, 1.0, n_removed, is_placed, is_graded, form, check)
     rows = np.flatnonzero(kernels.changed)
     moved = kernels.means[rows] - np.asarray(splats.means, np.float64)[rows]
     with np.errstate(invalid="ignore", over="ignore"):
@@ -90,5 +99,6 @@ def export_report(
         n_removed,
         is_placed,
         is_graded,
+        form,
         check,
     )

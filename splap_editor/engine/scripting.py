@@ -141,8 +141,8 @@ def write_posed(
     splats = written_splats(file.splats, kernels, edit, surface, stages("colour"))
     progress = stages("write")
     extra = columns_of(columns, snapshot) if snapshot is not None else {}
-    write_splats(path, file, splats, removed=edit.removed, as_3dgs=as_3dgs, extra=extra, progress=progress)
-    return export_report(Path(path), file.splats, kernels, edit, check)
+    form = write_splats(path, file, splats, removed=edit.removed, as_3dgs=as_3dgs, extra=extra, progress=progress)
+    return export_report(Path(path), file.splats, kernels, edit, form, check)
 
 
 def write_graph(

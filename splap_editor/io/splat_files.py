@@ -171,7 +171,7 @@ def write_splats(
     as_3dgs: bool = False,
     extra: Mapping[str, ArrayLike] | None = None,
     progress: Progress = no_progress,
-) -> None:
+) -> str:
     """Write splats in the format that the path's name ends in; a PLY where it ends in none.
 
     A PLY is written as `write_ply` does. A file of another format is made anew
@@ -182,6 +182,12 @@ def write_splats(
     ----------
     path, file, splats, removed, as_3dgs, extra, progress
         As of `write_ply`.
+
+    Returns
+    -------
+    str
+        What all splats were brought to, those too that are as in the file: "as .spz holds them"; empty where these
+        stand as they were.
 
     Raises
     ------
@@ -194,7 +200,7 @@ def write_splats(
     is_copy = _is_kept(file, row) and kept is None and not any_stored_difference(file.splats, splats)
     if row.is_lossless or (is_copy and not extra):
         write_ply(path, file, splats, removed=removed, as_3dgs=as_3dgs, extra=extra, progress=progress)
-        return
+        return "in the layout of 3DGS" if as_3dgs else ""
     if extra:
         raise FormatError(f"{path.name} cannot hold the columns {', '.join(extra)}. Save them in a PLY.")
     kept_splats = splats if kept is None else splats.at(kept)
@@ -211,6 +217,7 @@ def write_splats(
 
     _write_whole(path, encoded)
     progress(1.0)
+    return f"as {row.suffixes[0]} holds them"
 
 
 def write_animation(

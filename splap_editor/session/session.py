@@ -158,9 +158,10 @@ class Session:
         self._runner.stop_opening()
 
     def export(self, path: Path, *, as_3dgs: bool = False, columns: tuple[str, ...] = ()) -> None:
-        """Write the splats on screen, once they have settled, for which work that was halted goes on."""
-        self._ledger.is_halted = False
-        self._ledger.exports += (ExportOrder(path, columns, as_3dgs),)
+        """Write the splats on screen: at once, or once they have settled, for which work that was halted goes on."""
+        order = ExportOrder(path, columns, as_3dgs)
+        self._ledger.exports += (order,)
+        self._ledger.is_halted &= self._ledger.is_written_at_once(order)
         self._runner.advance()
 
     # ------------------------------------------------------------------ background work
@@ -196,5 +197,5 @@ class Session:
         if stage == "open":
             self.history.clear()
             self.scene_changed.emit()
-        elif stage == "export":
+        elif stage in ("export", "export at rest"):
             self.exported.emit(value)

@@ -39,10 +39,13 @@ class StageRunner:
         return self._loops[name]
 
     def advance(self) -> None:
-        """Start the first stage that is called for and not up to date, unless that is under way already."""
+        """Start the first stage that is called for and not up to date, unless that is under way already.
+
+        What runs beside the others is started as well.
+        """
         ledger = self._ledger
         for stage in self._stages:
-            if stage.name != "open" and self._is_left:
+            if not stage.is_at_once and self._is_left:
                 return
             if not stage.needs(ledger) or stage.is_current(ledger):
                 continue
@@ -51,15 +54,10 @@ class StageRunner:
                 stage.take(ledger, None, None)
                 continue
             self._set_state(stage.state(ledger))
-            if ledger.is_held and stage.name != "open":
+            if stage.is_at_once or not ledger.is_held:
+                self._start_unless_it_runs(stage)
+            if not stage.is_beside:
                 return
-            if any(self._loops[name].is_busy for name in stage.awaits):
-                return
-            request = stage.request(ledger)
-            under_way = self._loops[stage.name].wanted
-            if under_way is None or not stage.serves(under_way, request):
-                self._start(stage, request)
-            return
         self._set_state(ledger.state_at_rest)
 
     def halt(self) -> None:
@@ -90,7 +88,16 @@ class StageRunner:
         # A stage that awaits itself lets each of its jobs come to an end.
         cancels = stage.name not in stage.awaits
         threads = self._starter if stage.is_at_once else self._worker
-        return LatestJob(threads, stage.name, cancels=cancels, abandons=stage.is_at_once, freed=self.advance)
+        abandons = stage.is_at_once and cancels
+        return LatestJob(threads, stage.name, cancels=cancels, abandons=abandons, freed=self.advance)
+
+    def _start_unless_it_runs(self, stage: Stage) -> None:
+        if any(self._loops[name].is_busy for name in stage.awaits):
+            return
+        request = stage.request(self._ledger)
+        under_way = self._loops[stage.name].wanted
+        if under_way is None or not stage.serves(under_way, request):
+            self._start(stage, request)
 
     def _start(self, stage: Stage, request: Any) -> None:
         self._cancel(stage)

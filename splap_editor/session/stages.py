@@ -51,7 +51,7 @@ class Ledger:
     opening : OpenRequest, optional
         The file that is asked for in its place.
     exports : tuple of ExportOrder
-        Files to be written, in this order, once the splats have settled.
+        Files to be written, in this order: at once, or once the splats have settled where they are posed.
     bound : BoundEdit, optional
         The deformer in use.
     posed : Posed, optional
@@ -99,6 +99,10 @@ class Ledger:
         if posed is None or not (posed.is_settled or self.is_dragging):
             return False
         return binds_like(posed.edit, edit) and poses_like(posed.edit, edit)
+
+    def is_written_at_once(self, order: ExportOrder) -> bool:
+        """Whether a file takes nothing but the splats at rest: no surface is awaited for it."""
+        return not (order.columns or self.shown_scene.edit.needs_surface)
 
     @property
     def has_unexported_edit(self) -> bool:
@@ -149,7 +153,9 @@ class Stage:
     is_told : bool
         Shown in the progress bar; frames of a drag come and go too fast for that.
     is_at_once : bool
-        Runs on a thread of its own, beside the work of all others and beside one of its own kind that is blocked.
+        Runs on a thread of its own, beside the work of all others, whatever becomes of that.
+    is_beside : bool
+        Those after it neither wait for it nor build on it.
     awaits : tuple of str
         Stages whose value is taken first if it is on its way.
     """
@@ -167,6 +173,7 @@ class Stage:
     title: Callable[[Any], str] = lambda request: ""
     is_told: bool = True
     is_at_once: bool = False
+    is_beside: bool = False
     awaits: tuple[str, ...] = ()
 
 
@@ -195,6 +202,11 @@ def _pose_request(ledger: Ledger) -> PoseRequest:
         ledger.depictor.presenter(),
         lambda made: _show_pose(scene, made),
     )
+
+
+def _rest_export_request(ledger: Ledger) -> ExportRequest:
+    scene = ledger.shown_scene
+    return ExportRequest(ledger.exports[0], scene, scene.edit, scene.file, None, snapshot_of(scene, None))
 
 
 def _export_request(ledger: Ledger) -> ExportRequest:
@@ -284,6 +296,23 @@ def _pose_like(a: PoseRequest, b: PoseRequest) -> bool:
 
 STAGES = (
     Stage(
+        "export at rest",
+        needs=lambda ledger: (
+            bool(ledger.exports) and ledger.is_written_at_once(ledger.exports[0]) and not ledger.is_dragging
+        ),
+        is_current=lambda ledger: False,
+        state=lambda ledger: ledger.state,
+        cancels=(),
+        awaits=("export at rest", "export"),
+        request=_rest_export_request,
+        make=exported_file,
+        take=_take_export,
+        fail=_forget_export,
+        title=lambda request: f"Exporting {request.order.path.name}",
+        is_at_once=True,
+        is_beside=True,
+    ),
+    Stage(
         "open",
         needs=lambda ledger: ledger.opening is not None,
         is_current=lambda ledger: False,
@@ -366,7 +395,7 @@ STAGES = (
         is_current=lambda ledger: False,
         state=lambda ledger: ledger.state_at_rest,
         cancels=(),
-        awaits=("export",),
+        awaits=("export at rest", "export"),
         request=_export_request,
         make=exported_file,
         take=_take_export,
@@ -374,4 +403,5 @@ STAGES = (
         title=lambda request: f"Exporting {request.order.path.name}",
     ),
 )
-"""In the order in which they build on each other: the first that is called for and not current is made next."""
+"""In the order in which they build on each other: the first that is called for and not current is made next, and beside
+it what is in nobody's way."""

@@ -23,13 +23,19 @@ class ToldJob:
         self._told: Job | None = None
         self._elsewhere: Job | None = None
         for each in threads:
-            each.on_progress = lambda job: self.changed.emit(job)
+            each.on_progress = partial(self._on_progress, each)
             each.on_busy = partial(self._on_busy, each)
 
     def set_elsewhere(self, job: Job | None) -> None:
         """Tell of work that is done elsewhere whenever there is none here; None: it is over."""
         self._elsewhere = job
         if self._told is None:
+            self.changed.emit(job)
+
+    def _on_progress(self, threads: Threads, job: Job) -> None:
+        """Tell how far the job is that is told; of one that goes on beside it nothing is heard."""
+        is_beside = self._told is not None and self._running[threads] is not self._told
+        if job is self._told or not (job.title or is_beside):
             self.changed.emit(job)
 
     def _on_busy(self, threads: Threads, job: Job | None) -> None:

@@ -15,6 +15,7 @@ from splap_editor.engine import scripting, surface_stages
 from splap_editor.engine.cache import StageCache
 from splap_editor.engine.edit import PIN_COLOR, Pose, binds_like
 from splap_editor.engine.recipe_edit import recipe_of
+from splap_editor.engine.removal import Removal
 from splap_editor.io.ply import read_ply
 from splap_editor.io.recipe import recipe_from_json, recipe_to_json
 from splap_editor.resources import resource
@@ -235,6 +236,61 @@ def test_preparing_can_be_cancelled_and_resumed(main, session, monkeypatch):
     graph.go = True
     session.resume()
     main.run_until(lambda: session.state == "ready")
+
+
+def test_a_file_that_nothing_poses_is_written_while_the_scene_is_prepared(main, session, monkeypatch, tmp_path):
+    started = threading.Event()
+    graph = slow_graph(monkeypatch, started)
+    told, reports = [], []
+    session.exported.connect(reports.append)
+    session.told_job.changed.connect(lambda job: told.append(job.title if job is not None else ""))
+    session.hold()
+    session.open(TUBE)
+    main.run_until(lambda: session.scene is not None)
+    session.export(tmp_path / "held.ply")
+    main.run_until(lambda: len(reports) == 1)
+    session.release()
+    main.run_until(started.is_set)
+    for name in ("copy.ply", "copy.spz"):
+        session.export(tmp_path / name)
+    main.run_until(lambda: len(reports) == 3)
+    assert session.state == "preparing" and session.scene.surface is None
+    assert (tmp_path / "held.ply").read_bytes() == (tmp_path / "copy.ply").read_bytes() == TUBE.read_bytes()
+    assert [str(report).partition(", ")[2] for report in reports[1:]] == [
+        "unchanged",
+        "none of them moved, as .spz holds them",
+    ]
+    begun, last = told.index("Exporting copy.ply"), len(told) - told[::-1].index("Exporting copy.ply")
+    assert "Preparing tube.ply" not in told[begun:last], "of two jobs the bar shows one"
+    session.halt()
+    session.export(tmp_path / "halted.ply")
+    main.run_until(lambda: len(reports) == 4)
+    assert session.state == "halted", "it needs nothing of what was stopped"
+    graph.go = True
+    session.resume()
+    main.run_until(lambda: session.state == "ready")
+    assert session.failures == []
+
+
+def test_a_crop_is_written_while_the_scene_is_prepared_and_a_pose_waits_for_it(main, session, monkeypatch, tmp_path):
+    started = threading.Event()
+    graph = slow_graph(monkeypatch, started)
+    session.open(TUBE)
+    main.run_until(started.is_set)
+    scene = session.scene
+    scene.set_edit(replace(scene.edit, removal=Removal(mask=np.arange(scene.splats.n_splats) < 9)))
+    reports = []
+    session.exported.connect(reports.append)
+    session.export(tmp_path / "crop.ply")
+    main.run_until(lambda: reports)
+    assert read_ply(tmp_path / "crop.ply").splats.n_splats == scene.splats.n_splats - 9
+    session.steps.add_handle(rows_region(scene, end_rows(scene, 1)))
+    session.export(tmp_path / "posed.ply")
+    session.export(tmp_path / "again.ply")
+    assert session.state == "preparing" and not (tmp_path / "posed.ply").exists()
+    graph.go = True
+    main.run_until(lambda: len(reports) == 3)
+    assert (tmp_path / "again.ply").read_bytes() == (tmp_path / "posed.ply").read_bytes()
 
 
 def waits_until_cancelled(started, progress):

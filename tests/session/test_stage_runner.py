@@ -199,3 +199,20 @@ def test_what_is_made_at_once_waits_for_nothing_not_even_for_its_like_that_is_bl
     main.run_to_the_end_of("splap-open")
     doors[0].set()
     assert taken == [2], "what was given up is not heard of"
+
+
+def test_what_runs_beside_the_others_neither_waits_nor_is_waited_for(main, worker, starter, ledger):
+    shop = Shop()
+    shop.wait_for = {name: threading.Event() for name in ("beside", "first")}
+    beside = shop.stage("beside", is_at_once=True, is_beside=True, awaits=("beside",))
+    runner = StageRunner(ledger, worker, starter, (beside, shop.stage("first"), shop.stage("second")))
+    runner.advance()
+    main.run_until(lambda: len(shop.told) == 2)
+    assert sorted(shop.told) == ["beside 1", "first 1"] and ledger.state == "first under way"
+    ledger.scene.shown_edit = Edit(2)
+    shop.wait_for["first"].set()
+    main.run_until(lambda: shop.made.get("second") == 2)
+    assert shop.made.keys() == {"first", "second"}, "it goes on, and what it awaits is itself"
+    shop.wait_for["beside"].set()
+    main.run_until(lambda: shop.made.get("beside") == 2)
+    assert shop.told.count("beside 1") == shop.told.count("beside 2") == 1

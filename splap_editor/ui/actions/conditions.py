@@ -148,7 +148,7 @@ def can_redo(state: State) -> bool:
 
 def is_busy(state: State) -> bool:
     """Something is being worked on in the background."""
-    return state.session.is_busy("open", "edit", "prepare", "bind", "pose", "export", "frames")
+    return state.session.is_busy("open", "edit", "prepare", "bind", "pose", "export", "export at rest", "frames")
 
 
 def is_halted(state: State) -> bool:

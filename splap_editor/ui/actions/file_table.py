@@ -49,7 +49,7 @@ FILE_TABLE: tuple[ActionSpec, ...] = (
         "&Export…",
         ("Ctrl+E",),
         icon="export",
-        tip="Write what is on screen as a PLY, row for row.",
+        tip="Write what is on screen as a file of splats.",
         needs=has_scene,
         menu="&File",
         breaks=True,
