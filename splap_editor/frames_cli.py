@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from splap_editor.io import plain_edit as plain
+from splap_editor.io.atomic_file import not_written
 from splap_editor.io.content_hash import has_content
 from splap_editor.io.png import write_png
 from splap_editor.io.recipe import read_recipe
@@ -109,9 +110,7 @@ def render(options: argparse.Namespace) -> int:
     makes_video = is_video(output)
     if makes_video and frames is None and options.turntable is None:
         raise ValueError(f"{output.name} is a video, which needs --frames or --turntable")
-    if not makes_video and (output.is_dir() or output.suffix.lower() != ".png"):
-        output.mkdir(parents=True, exist_ok=True)
-        output = output / f"{file.path.stem}.png"
+    output = output if makes_video else _picture_path(output, file.path.stem)
     with report("scene"):
         studio, view = _studio(options, held, file, poser)
     try:
@@ -194,6 +193,18 @@ def _studio(
     studio.viewport.camera.world_up = np.array(spec.world_up)
     eye, focus, up = (np.array(v, np.float64) for v in (spec.position, spec.focal_point, spec.view_up))
     return studio, View(eye, focus, up, spec.angle, spec.is_parallel)
+
+
+def _picture_path(output: Path, stem: str) -> Path:
+    """The PNG that is meant: the one named, or one in a folder, which is made; ValueError where it cannot be."""
+    try:
+        if not output.is_dir():
+            if output.suffix.lower() == ".png":
+                return output
+            output.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ValueError(f"{not_written(output, error)}.") from error
+    return output / f"{stem}.png"
 
 
 def _rate(options: argparse.Namespace, timeline: "Timeline | None") -> float:

@@ -133,6 +133,7 @@ def test_the_whole_object_is_in_the_picture(tmp_path, ply):
         (["render", "--frames", "--turntable", "3"], "give one of them"),
         (["render", "--turntable", "0"], "--turntable must be"),
         (["render", "--size", "20000x10"], "16384"),
+        (["render", "-o", "LONG"], ".png cannot be written: File name too long. Choose a shorter name"),
         (["deform", "--frames", "--recipe", "EDIT"], "--frames needs keyframes"),
         (["deform", "--frames", "--columns", "stretch", "--session", "WORK"], "--columns goes with one PLY"),
         (["deform", "--frames", "--report", "--session", "WORK"], "--report looks at one pose"),
@@ -143,7 +144,7 @@ def test_the_whole_object_is_in_the_picture(tmp_path, ply):
 def test_what_cannot_be_is_said_in_a_sentence(tmp_path, ply, session, capsys, arguments, message):
     held, path = session
     write_recipe(tmp_path / "edit.json", held.recipe)
-    names = {"EDIT": tmp_path / "edit.json", "WORK": path, "PLY": ply}
+    names = {"EDIT": tmp_path / "edit.json", "WORK": path, "PLY": ply, "LONG": tmp_path / f"{'a' * 300}.png"}
     command, *rest = (str(names.get(word, word)) for word in arguments)
     assert main([command, str(ply), "-o", str(tmp_path / "out.png"), *rest]) == 2
     assert message in capsys.readouterr().err

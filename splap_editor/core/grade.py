@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from splap_editor.core.grade_options import GradeOptions
 from splap_editor.core.index_spaces import FileMask
+from splap_editor.core.progress import Progress, no_progress
 from splap_editor.core.removal import Picked
 from splap_editor.core.splats.splats import Splats
 
@@ -85,7 +86,9 @@ def _turn_about_grey(angle: float) -> NDArray[np.float64]:
     return np.eye(3) + np.sin(angle) * across + (1.0 - np.cos(angle)) * across @ across
 
 
-def graded_splats(splats: Splats, grades: Iterable[tuple[GradeOptions, Share | None]]) -> Splats:
+def graded_splats(
+    splats: Splats, grades: Iterable[tuple[GradeOptions, Share | None]], progress: Progress = no_progress
+) -> Splats:
     """Grade the colours and opacities of splats, one grade after the other.
 
     Parameters
@@ -94,6 +97,8 @@ def graded_splats(splats: Splats, grades: Iterable[tuple[GradeOptions, Share | N
     grades : iterable of (GradeOptions, weights)
         With the share in [0, 1], (N,) float, to which each splat is graded; None: all of them fully. In between the
         colour, and the opacity, is mixed of that before and that after.
+    progress : Progress
+        Told the share done; may cancel.
 
     Returns
     -------
@@ -108,15 +113,18 @@ def graded_splats(splats: Splats, grades: Iterable[tuple[GradeOptions, Share | N
     if colored:
         sh0, shN = np.array(splats.sh0), np.array(splats.shN)
         for lo in range(0, splats.n_splats, _BLOCK_ROWS):
+            progress(0.8 * lo / splats.n_splats)
             _grade_colors(sh0[lo : lo + _BLOCK_ROWS], shN[lo : lo + _BLOCK_ROWS], colored, lo)
         changed = replace(changed, sh0=sh0, shN=shN if shN.shape[1] else splats.shN)
     if faded:
         logits = np.array(splats.logit_opacities)
-        for factor, weights in faded:
+        for done, (factor, weights) in enumerate(faded):
+            progress(0.8 + 0.2 * done / len(faded))
             rows = slice(None) if weights is None else np.flatnonzero(weights)
             shares = 1.0 if weights is None else np.asarray(weights, np.float64)[rows]
             logits[rows] = faded_logits(logits[rows], factor, shares)
         changed = replace(changed, logit_opacities=logits)
+    progress(1.0)
     return changed
 
 

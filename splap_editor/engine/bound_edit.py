@@ -266,9 +266,9 @@ def written_splats(
     progress: Progress = no_progress,
 ) -> Splats:
     """Splats to write: as adapted, then graded, then in their place; ``surface`` is needed by a grade's falloff."""
-    splats = rest if kernels is None else adapted_splats(rest, kernels, part_of(progress, 0.0, 0.5))
-    graded = edit.grading.graded(splats, surface)
-    return placed_splats(graded, edit.place, part_of(progress, 0.5, 1.0))
+    splats = rest if kernels is None else adapted_splats(rest, kernels, part_of(progress, 0.0, 0.4))
+    graded = edit.grading.graded(splats, surface, part_of(progress, 0.4, 0.7))
+    return placed_splats(graded, edit.place, part_of(progress, 0.7, 1.0))
 
 
 def ready_for_drags(surface: Surface, cache: StageCache | None = None) -> None:

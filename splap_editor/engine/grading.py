@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from splap_editor.core.grade import GradeStep, Share, graded_splats
 from splap_editor.core.grade_options import GradeOptions
 from splap_editor.core.index_spaces import FileMask
+from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.removal import Finder as Find
 from splap_editor.core.removal import RemovalStep, after_step, rows_step
 from splap_editor.core.splats.splats import Splats
@@ -88,7 +89,7 @@ class Grading:
             return True
         return self.steps == other.steps
 
-    def graded(self, splats: Splats, surface: Surface | None = None) -> Splats:
+    def graded(self, splats: Splats, surface: Surface | None = None, progress: Progress = no_progress) -> Splats:
         """Grade splats of the file, at rest or posed; where nothing is graded they are the same object.
 
         Parameters
@@ -96,6 +97,8 @@ class Grading:
         splats : Splats
         surface : Surface, optional
             Of the file's scene; needed for a falloff.
+        progress : Progress
+            Told the share done; may cancel.
 
         Raises
         ------
@@ -106,20 +109,24 @@ class Grading:
             return splats
         if self.needs_surface and surface is None:
             raise ValueError("a grade with a falloff needs the surface of the scene: prepare it first")
-        return graded_splats(splats, self._shares(surface))
+        shares = self._shares(surface, part_of(progress, 0.0, 0.5))
+        return graded_splats(splats, shares, part_of(progress, 0.5, 1.0))
 
     def graded_so_far(self, splats: Splats, surface: Surface | None) -> Splats:
         """The same for a picture: while there is no surface yet a falloff is left out."""
         return splats if self.is_identity else graded_splats(splats, self._shares(surface))
 
-    def _shares(self, surface: Surface | None) -> list[tuple[GradeOptions, Share | None]]:
-        return [
-            (
-                step.options,
-                mask if mask is None or surface is None else faded_share(mask, step.options.falloff, surface),
-            )
-            for step, mask in zip(self.steps, self.masks, strict=True)
-        ]
+    def _shares(
+        self, surface: Surface | None, progress: Progress = no_progress
+    ) -> list[tuple[GradeOptions, Share | None]]:
+        found: list[tuple[GradeOptions, Share | None]] = []
+        for step, mask in zip(self.steps, self.masks, strict=True):
+            progress(len(found) / len(self.steps))
+            share: Share | None = mask
+            if mask is not None and surface is not None:
+                share = faded_share(mask, step.options.falloff, surface)
+            found.append((step.options, share))
+        return found
 
 
 _SHARES: WeakKeyDictionary[Surface, tuple[tuple[FileMask, float, NDArray[np.float32]], ...]] = WeakKeyDictionary()

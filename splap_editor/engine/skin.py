@@ -64,8 +64,9 @@ def write_skin(
             told = part_of(progress, (number + 0.7) / n_parts, (number + 1) / n_parts)
             played = skin.blended(file.splats.means, number, told)
             farthest = max(farthest, float(np.linalg.norm(played - means, axis=1).max()))
-    graded, last = bound.edit.grading.graded(file.splats, bound.surface), part_of(progress, 1 - 1 / n_parts, 1.0)
-    write_skinned(path, file, skin, splats=graded, removed=bound.edit.removed, progress=last)
+    last = part_of(progress, 1 - 1 / n_parts, 1.0)
+    graded = bound.edit.grading.graded(file.splats, bound.surface, part_of(last, 0.0, 0.3))
+    write_skinned(path, file, skin, splats=graded, removed=bound.edit.removed, progress=part_of(last, 0.3, 1.0))
     return farthest
 
 

@@ -71,9 +71,30 @@ def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     _sync_directory(target.parent)
 
 
-def way_out(error: OSError) -> str:
-    """What to do where a file could not be written, as a sentence without its full stop."""
-    return _WAYS_OUT.get(error.errno or 0, "Free some space or choose another place")
+@contextlib.contextmanager
+def whole_file(path: str | os.PathLike[str], refused: type[ValueError]) -> Iterator[BinaryIO]:
+    """Open a file as `atomic_file` does, and say in a sentence for the user what keeps it from being written.
+
+    Raises
+    ------
+    ValueError
+        One of the given kind, that names the path and says what to do.
+    """
+    try:
+        with atomic_file(path) as file:
+            yield file
+    except FileNotFoundError:
+        # A link may lead into a directory that is gone.
+        folder = Path(os.path.realpath(path)).parent
+        raise refused(f"{path} cannot be written: the directory {folder} does not exist. Create it.") from None
+    except OSError as error:
+        raise refused(f"{not_written(path, error)}; what was there is unchanged.") from error
+
+
+def not_written(path: str | os.PathLike[str], error: OSError) -> str:
+    """Say that a file could not be written, why and what to do, without a full stop."""
+    way_out = _WAYS_OUT.get(error.errno or 0, "Free some space or choose another place")
+    return f"{path} cannot be written: {error.strerror or error}. {way_out}"
 
 
 def _new_part(target: Path) -> tuple[int, Path]:

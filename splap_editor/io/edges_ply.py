@@ -5,7 +5,7 @@ import os
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.io.atomic_file import atomic_file, way_out
+from splap_editor.io.atomic_file import whole_file
 from splap_editor.io.ply_header import PlyError
 
 _EDGE = np.dtype([("vertex1", "<i4"), ("vertex2", "<i4"), ("offset", "<f4"), ("length", "<f4")])
@@ -65,10 +65,7 @@ def write_edges_ply(
         "property float length",
         "end_header",
     ]
-    try:
-        with atomic_file(path) as file:
-            file.write(("\n".join(header) + "\n").encode())
-            file.write(np.ascontiguousarray(positions, "<f4").tobytes())
-            file.write(table.tobytes())
-    except OSError as error:
-        raise PlyError(f"{path} cannot be written: {error.strerror or error}. {way_out(error)}.") from error
+    with whole_file(path, PlyError) as file:
+        file.write(("\n".join(header) + "\n").encode())
+        file.write(np.ascontiguousarray(positions, "<f4").tobytes())
+        file.write(table.tobytes())

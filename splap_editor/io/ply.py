@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from splap_editor.core.index_spaces import FileMask
 from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.splats.splats import LARGEST_COORDINATE, Splats
-from splap_editor.io.atomic_file import atomic_file, way_out
+from splap_editor.io.atomic_file import whole_file
 from splap_editor.io.formats.bare_splats import THIN_LOG_SCALE, bare_splats
 from splap_editor.io.layout import COMMON_NAMES, SPLATS_SHARE, Layout, PlyEvidence
 from splap_editor.io.layouts import LAYOUTS, layout_of, require_splats
@@ -246,26 +246,17 @@ def kept_rows(removed: FileMask | None, file: SplatFile) -> FileMask | None:
 def _write_blocks(
     path: Path, header: bytes, blocks: Iterator[NDArray[np.uint8] | bytes], n_bytes: int, progress: Progress
 ) -> None:
-    """Write header and blocks to an atomic file, errors as sentences."""
+    """Write header and blocks to a file, whole or not at all."""
     written, next_report = 0, 0.0
-    try:
-        with atomic_file(path) as out:
-            out.write(header)
-            for block in blocks:
-                data = block if isinstance(block, bytes) else np.ascontiguousarray(block).data.cast("B")
-                out.write(data)
-                written += len(data)
-                if written >= next_report * n_bytes:
-                    progress(min(written / max(n_bytes, 1), 1.0))
-                    next_report += 0.05
-    except FileNotFoundError:
-        # A link may lead into a directory that is gone.
-        folder = Path(os.path.realpath(path)).parent
-        raise PlyError(f"{path} cannot be written: the directory {folder} does not exist. Create it.") from None
-    except OSError as error:
-        raise PlyError(
-            f"{path} cannot be written: {error.strerror or error}. {way_out(error)}; what was there is unchanged."
-        ) from error
+    with whole_file(path, PlyError) as out:
+        out.write(header)
+        for block in blocks:
+            data = block if isinstance(block, bytes) else np.ascontiguousarray(block).data.cast("B")
+            out.write(data)
+            written += len(data)
+            if written >= next_report * n_bytes:
+                progress(min(written / max(n_bytes, 1), 1.0))
+                next_report += 0.05
 
 
 def _require_no_overflow(splats: Splats, rest: Splats, name: str) -> None:

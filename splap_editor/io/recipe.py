@@ -15,7 +15,7 @@ from splap_editor.core.presets import PRESETS, with_preset
 from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.reach_options import CageOptions, ReachOptions
 from splap_editor.core.splats.splats import LARGEST_COORDINATE
-from splap_editor.io.atomic_file import atomic_file, way_out
+from splap_editor.io.atomic_file import whole_file
 from splap_editor.io.json_object import JsonObject, Look, json_lines, no_look, parsed_json, shown
 from splap_editor.io.plain_edit import Edit, Handle, Pin, Vector
 from splap_editor.io.recipe_camera import camera_from_json, camera_to_json
@@ -113,11 +113,8 @@ def write_recipe(path: str | os.PathLike[str], recipe: Edit) -> None:
         data = json_lines(held).encode()
     except UnicodeEncodeError:
         raise RecipeError("a handle or pin has a name that cannot be written: rename it") from None
-    try:
-        with atomic_file(path) as file:
-            file.write(data)
-    except OSError as error:
-        raise RecipeError(f"{path} cannot be written: {error.strerror or error}. {way_out(error)}.") from error
+    with whole_file(path, RecipeError) as file:
+        file.write(data)
 
 
 def recipe_from_json(value: Any, look: Look = no_look) -> Edit:

@@ -13,7 +13,7 @@ import numpy as np
 from splap_editor.core.index_spaces import FileMask
 from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.core.timeline import LAST_FRAME, Key, Timeline
-from splap_editor.io.atomic_file import atomic_file, way_out
+from splap_editor.io.atomic_file import whole_file
 from splap_editor.io.json_object import JsonObject, Look, json_lines, no_look, parsed_json, shown
 from splap_editor.io.recipe import RecipeError, pose_from_json, pose_to_json, recipe_from_json, recipe_to_json
 from splap_editor.io.regular_file import regular_bytes
@@ -95,11 +95,8 @@ def write_session_file(path: str | os.PathLike[str], session: SessionFile) -> No
         data = json_lines(held).encode()
     except UnicodeEncodeError:
         raise SessionFileError(f"{session.ply.path!r} is not a name that can be written: rename the PLY") from None
-    try:
-        with atomic_file(path) as file:
-            file.write(data)
-    except OSError as error:
-        raise SessionFileError(f"{path} cannot be written: {error.strerror or error}. {way_out(error)}.") from error
+    with whole_file(path, SessionFileError) as file:
+        file.write(data)
 
 
 def relative_path(path: Path, folder: Path) -> str:

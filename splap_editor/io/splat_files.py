@@ -1,10 +1,10 @@
 """Splat files of every format: opened by what they hold, saved by what their name ends in."""
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
@@ -12,7 +12,7 @@ from splap_editor.core.camera_path import CameraTrack
 from splap_editor.core.index_spaces import FileMask
 from splap_editor.core.progress import FrameProgress, Progress, no_frame_progress, no_progress, part_of
 from splap_editor.core.splats.splats import Splats
-from splap_editor.io.atomic_file import atomic_file, way_out
+from splap_editor.io.atomic_file import whole_file
 from splap_editor.io.formats.bare_splats import bare_splats
 from splap_editor.io.formats.losses import losses
 from splap_editor.io.formats.source import FormatError, Source
@@ -207,15 +207,13 @@ def write_splats(
     bare, _ = bare_splats(kept_splats, row.largest_degree, part_of(progress, 0.0, 0.1))
     encoding = part_of(progress, 0.1, 1.0)
 
-    def encoded(out: BinaryIO) -> None:
+    with whole_file(path, FormatError) as out:
         if _is_kept(file, row):
             from splap_editor.io.formats.compressed import write_in_order
 
             write_in_order(out, bare, encoding)
         else:
             row.write(out, bare, encoding)
-
-    _write_whole(path, encoded)
     progress(1.0)
     return f"as {row.suffixes[0]} holds them"
 
@@ -265,7 +263,8 @@ def write_animation(
     def encoding(place: int) -> Progress:
         return part_of(progress_of(place), 0.2, 1.0)
 
-    _write_whole(Path(path), lambda out: row.write_frames(out, bared(), rate, camera, encoding))
+    with whole_file(path, FormatError) as out:
+        row.write_frames(out, bared(), rate, camera, encoding)
 
 
 def write_skinned(
@@ -293,23 +292,10 @@ def write_skinned(
     if kept is not None:
         splats, skin = splats.at(kept), replace(skin, weights=skin.weights[kept])
     bare, _ = bare_splats(splats, FORMATS["gltf"].largest_degree, part_of(progress, 0.0, 0.1))
-    _write_whole(Path(path), lambda out: write(out, bare, skin, part_of(progress, 0.1, 1.0)))
+    with whole_file(path, FormatError) as out:
+        write(out, bare, skin, part_of(progress, 0.1, 1.0))
 
 
 def _is_kept(file: SplatFile, row: SplatFormat) -> bool:
     """Whether a compressed PLY is to be written as the one that it was: its rows keep their order."""
     return row.is_ply and not row.is_lossless and file.layout.columns is None
-
-
-def _write_whole(path: Path, encoded: Callable[[BinaryIO], None]) -> None:
-    """Write a file whole or not at all, errors as sentences."""
-    try:
-        with atomic_file(path) as out:
-            encoded(out)
-    except FileNotFoundError:
-        folder = Path(os.path.realpath(path)).parent
-        raise FormatError(f"{path} cannot be written: the directory {folder} does not exist. Create it.") from None
-    except OSError as error:
-        raise FormatError(
-            f"{path} cannot be written: {error.strerror or error}. {way_out(error)}; what was there is unchanged."
-        ) from error

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from splap_editor.io.atomic_file import atomic_file
+from splap_editor.io.atomic_file import whole_file
 
 Pictures = Iterator[NDArray[np.uint8]]
 
@@ -22,10 +22,11 @@ class VideoError(ValueError):
 
 def _pillow(kind: str, **more: Any) -> Callable[[Path, Pictures, float], None]:
     def write(path: Path, pictures: Pictures, rate: float) -> None:
-        first, *held = map(Image.fromarray, itertools.islice(pictures, None if kind == "PNG" else 1))
-        # The writer of APNG goes through them twice, that of GIF takes them one at a time.
-        rest: Iterable[Image.Image] = held if kind == "PNG" else map(Image.fromarray, pictures)
-        with atomic_file(path) as file:
+        # Opened before the first picture is made: what cannot be written is said at once.
+        with whole_file(path, VideoError) as file:
+            first, *held = map(Image.fromarray, itertools.islice(pictures, None if kind == "PNG" else 1))
+            # The writer of APNG goes through them twice, that of GIF takes them one at a time.
+            rest: Iterable[Image.Image] = held if kind == "PNG" else map(Image.fromarray, pictures)
             first.save(file, kind, save_all=True, append_images=rest, duration=1000.0 / rate, loop=0, **more)
 
     return write
@@ -43,7 +44,7 @@ def _ffmpeg(codec: str, *options: str) -> Callable[[Path, Pictures, float], None
         evened = map(_even, pictures)
         first = next(evened)
         height, width, _ = first.shape
-        with tempfile.TemporaryDirectory() as folder:
+        with whole_file(path, VideoError) as file, tempfile.TemporaryDirectory() as folder:
             made = Path(folder) / f"video{path.suffix.lower()}"
             encoder = imageio_ffmpeg.write_frames(
                 str(made),
@@ -64,7 +65,7 @@ def _ffmpeg(codec: str, *options: str) -> Callable[[Path, Pictures, float], None
                 ) from error
             finally:
                 encoder.close()
-            with made.open("rb") as source, atomic_file(path) as file:
+            with made.open("rb") as source:
                 shutil.copyfileobj(source, file, 1 << 20)
 
     return write
@@ -100,9 +101,7 @@ def write_video(path: Path, pictures: Iterable[NDArray[np.uint8]], rate: float) 
     Raises
     ------
     VideoError
-        If there is no picture, or a package is missing.
-    OSError
-        If the file cannot be written.
+        If there is no picture, a package is missing, or the file cannot be written.
     """
     held = iter(pictures)
     first = next(held, None)

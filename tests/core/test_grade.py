@@ -6,6 +6,7 @@ import pytest
 from splap_editor.core.grade import LUMA, MIDDLE_GREY, color_map, faded_logits, graded_splats
 from splap_editor.core.grade_options import GradeOptions
 from splap_editor.core.options import options_of
+from splap_editor.core.progress import Cancelled
 from splap_editor.core.splats.rotations import quats_to_matrices
 from splap_editor.core.splats.spherical_harmonics import rotated_sh, view_colors
 from splap_editor.core.splats.splats import Splats
@@ -14,6 +15,18 @@ N = 60
 FULL = GradeOptions(
     exposure=0.7, contrast=1.3, saturation=0.6, hue=40.0, temperature=0.5, tint=-0.3, opacity=0.5, falloff=1.0
 )
+
+
+class Stop:
+    """Progress that cancels at its call of a number."""
+
+    def __init__(self, at):
+        self.left = at
+
+    def __call__(self, share):
+        self.left -= 1
+        if self.left < 0:
+            raise Cancelled
 
 
 def some_splats(n_coefficients=15, dtype=np.float64, seed=0):
@@ -51,6 +64,15 @@ def test_a_grade_at_rest_is_the_same_object(options):
     matrix, offset = color_map(options)
     np.testing.assert_array_equal(matrix, np.eye(3))
     np.testing.assert_array_equal(offset, 0.0)
+
+
+def test_grading_tells_how_far_it_is_and_can_be_cancelled():
+    splats, told = some_splats(), []
+    graded_splats(splats, [(FULL, None), (FULL, np.ones(N))], told.append)
+    assert told == sorted(told) and told[0] == 0.0 and told[-1] == 1.0
+    for at in range(len(told)):
+        with pytest.raises(Cancelled):
+            graded_splats(splats, [(FULL, None), (FULL, np.ones(N))], Stop(at))
 
 
 @pytest.mark.parametrize("name", [name for name in options_of(GradeOptions) if name not in ("opacity", "falloff")])

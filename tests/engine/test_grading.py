@@ -14,6 +14,7 @@ from splap_editor.core.handle_nodes import Region
 from splap_editor.core.options import OptionSet
 from splap_editor.core.place import Place
 from splap_editor.core.pose import Pose
+from splap_editor.core.progress import Cancelled
 from splap_editor.core.reach_options import ReachOptions
 from splap_editor.core.removal import PickedBall, PickedRange, PickedRows
 from splap_editor.engine.bound_edit import posed, written_splats
@@ -142,6 +143,20 @@ def test_what_is_removed_is_not_graded_by_a_quantity(file):
     edit = edit_of(recipe_from_json(recipe), file.splats)
     np.testing.assert_array_equal(edit.grading.masks[0], ~gone)
     assert edit.removal.like(Removal().with_rows(gone))
+
+
+def test_a_file_that_is_graded_tells_how_far_it_is_and_hears_cancel_between_grades(file, surface):
+    steps = [GradeStep(replace(WARM, falloff=reach), ball(file)) for reach in (0.3, 0.4)]
+    edit = Edit(grading=grading_of(steps, file.splats))
+    told = []
+    written_splats(file.splats, None, edit, surface, told.append)
+    assert told == sorted(told) and len(set(told)) >= 4
+
+    def stop(share):
+        raise Cancelled
+
+    with pytest.raises(Cancelled):
+        written_splats(file.splats, None, edit, surface, stop)
 
 
 def test_steps_are_put_over_each_other_changed_and_taken_away(file):

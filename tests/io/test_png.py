@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from splap_editor.io.png import write_png
+from splap_editor.io.png import PictureError, write_png
 
 MODES = {1: "L", 3: "RGB", 4: "RGBA"}
 
@@ -23,3 +23,9 @@ def test_pixels_come_back(tmp_path, n_channels, size):
 def test_what_is_no_picture_is_refused(tmp_path, pixels):
     with pytest.raises(ValueError, match="pixels must be"):
         write_png(tmp_path / "a.png", pixels)
+
+
+def test_a_picture_that_cannot_be_written_is_refused_in_a_sentence(tmp_path):
+    with pytest.raises(PictureError, match=r"\.png cannot be written: File name too long. Choose a shorter name"):
+        write_png(tmp_path / f"{'a' * 300}.png", np.zeros((2, 2, 3), np.uint8))
+    assert list(tmp_path.iterdir()) == []

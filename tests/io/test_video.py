@@ -50,6 +50,17 @@ def test_a_video_that_is_broken_off_leaves_nothing(tmp_path, ending):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("ending", VIDEOS)
+def test_what_cannot_be_written_is_said_before_a_picture_is_made(tmp_path, ending):
+    drawn = []
+    path = tmp_path / f"{'a' * 300}{ending}"
+    with pytest.raises(VideoError, match=f"{ending} cannot be written: File name too long. Choose a shorter name"):
+        write_video(path, map(lambda picture: drawn.append(1) or picture, pictures()), 24.0)
+    assert len(drawn) <= 1
+    with pytest.raises(VideoError, match=r"gone does not exist\. Create it"):
+        write_video(tmp_path / "gone" / f"out{ending}", pictures(), 24.0)
+
+
 def test_no_picture_and_no_encoder_are_said(tmp_path, monkeypatch):
     assert is_video(tmp_path / "a.MP4") and not is_video(tmp_path / "a.png")
     with pytest.raises(VideoError, match="no picture"):

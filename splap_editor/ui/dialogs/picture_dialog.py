@@ -3,7 +3,6 @@
 from pathlib import Path
 
 from PySide6.QtCore import QSettings, QSize, QStandardPaths, Qt
-from PySide6.QtGui import QImage
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
@@ -16,6 +15,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from splap_editor.io.png import write_png
 from splap_editor.ui.theme import STEP
 from splap_editor.ui.widgets.number_field import NumberField
 from splap_editor.ui.widgets.options_form import form_label
@@ -92,12 +92,9 @@ class PictureDialog(QDialog):
         width, height = int(self.width_field.value()), int(self.height_field.value())
         try:
             pixels = screenshot(self._viewport, width, height, is_transparent=self.transparent.isChecked())
+            write_png(path, pixels)
         except (ValueError, MemoryError) as error:
             self._toast.fail(f"The picture was not saved: {error}")
             return
-        image = QImage(pixels.data, width, height, 4 * width, QImage.Format.Format_RGBA8888)
-        if image.save(str(path), "PNG"):  # type: ignore[call-overload] # the stub wants bytes, which PySide refuses
-            self._toast.say(f"Saved the picture as {path.name}.")
-        else:
-            self._toast.fail(f"{path.name} could not be written; is the disk full or the folder protected?")
+        self._toast.say(f"Saved the picture as {path.name}.")
         self.accept()
