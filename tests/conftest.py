@@ -77,13 +77,15 @@ def unchanged_numpy_errors() -> Iterator[None]:
 
 
 @pytest.fixture(autouse=True)
-def no_leaked_threads() -> Iterator[None]:
-    """Fail a test that leaves a Python or Qt thread running."""
+def no_leaked_threads(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Fail a test that leaves a Python thread running, or one that opens windows a thread of Qt."""
     before = set(threading.enumerate())
     yield
     leaked = [thread for thread in threading.enumerate() if thread not in before and not _ended(thread)]
     names = [f"{thread.name} ({type(thread).__name__})" for thread in leaked]
-    names += [f"{thread!r} (QThread)" for thread in _running_qthreads()]
+    # Looking through all objects takes long where hundreds of thousands are left of earlier tests.
+    if request.node.get_closest_marker("window") is not None:
+        names += [f"{thread!r} (QThread)" for thread in _running_qthreads()]
     assert not names, f"threads left running: {', '.join(names)}"
 
 

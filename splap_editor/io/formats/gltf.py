@@ -333,11 +333,9 @@ def _fill(sheet: Splats, rows: slice, document: _Document, cloud: _Cloud, progre
     is_moved = np.abs(world - np.eye(4)).max() > 1e-12
     for block in row_blocks(cloud.n_splats, part_of(progress, 0.5, 1.0)):
         to = slice(rows.start + block.start, rows.start + block.stop)
-        with np.errstate(invalid="ignore", over="ignore"):
-            sheet.log_scales[to] = log_scales_of(scales[block]) + np.float32(np.log(factor))
+        sheet.log_scales[to] = log_scales_of(scales[block]) + np.float32(np.log(factor))
         exact = alphas[block].astype(np.float64)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            sheet.logit_opacities[to] = np.clip(np.log(exact) - np.log1p(-exact), FAINT, OPAQUE)
+        sheet.logit_opacities[to] = np.clip(np.log(exact) - np.log1p(-exact), FAINT, OPAQUE)
         sheet.sh0[to] = 0 if colors is None else colors[block]
         parts = means[block], quats[block], shN[block]
         sheet.means[to], sheet.quats[to], sheet.shN[to] = _moved(*parts, world, turn) if is_moved else parts
@@ -348,14 +346,13 @@ def _moved(
     means: NDArray, quats: NDArray, shN: NDArray, world: NDArray[np.float64], turn: NDArray[np.float64]
 ) -> tuple[NDArray, NDArray, NDArray]:
     """Splats where their node puts them; positions that overflow are refused by row."""
-    with np.errstate(invalid="ignore", over="ignore"):
-        means = means.astype(np.float64) @ world[:3, :3].T + world[:3, 3]
-        quats = quat_products(matrices_to_quats(turn[None]), quats.astype(np.float64))
-        if shN.shape[1]:
-            from splap_editor.core.splats.spherical_harmonics import rotated_sh
+    means = means.astype(np.float64) @ world[:3, :3].T + world[:3, 3]
+    quats = quat_products(matrices_to_quats(turn[None]), quats.astype(np.float64))
+    if shN.shape[1]:
+        from splap_editor.core.splats.spherical_harmonics import rotated_sh
 
-            shN = rotated_sh(shN, np.broadcast_to(turn, (len(shN), 3, 3)))
-        return means.astype(np.float32), quats.astype(np.float32), shN
+        shN = rotated_sh(shN, np.broadcast_to(turn, (len(shN), 3, 3)))
+    return means.astype(np.float32), quats.astype(np.float32), shN
 
 
 def write(out: BinaryIO, splats: Splats, progress: Progress) -> None:

@@ -150,21 +150,19 @@ def _fill(
 ) -> None:
     """Write some splats of a section to some rows."""
     block = section.records[held]
-    # Numbers that are none, or overflow, give positions that are refused by row.
-    with np.errstate(invalid="ignore", over="ignore"):
-        if level == 0:
-            sheet.means[rows] = block["mean"]
-        else:
-            offsets = (block["mean"].astype(np.float64) - section.position_range) * section.step
-            sheet.means[rows] = offsets + section.centers[section.buckets(held.start, held.stop)]
-        sheet.log_scales[rows] = log_scales_of(block["scale"].astype(np.float32))
-        sheet.quats[rows] = block["quat"]
-        sheet.sh0[rows] = (block["rgba"][:, :3].astype(np.float32) / 255 - 0.5) / np.float32(SH_C0)
-        sheet.logit_opacities[rows] = logits_of_bytes()[block["rgba"][:, 3]]
-        values = block["sh"].astype(np.float32)
-        if level == 2:
-            low, high = harmonic_range
-            values = (low + values / 255 * (high - low)).astype(np.float32)
+    if level == 0:
+        sheet.means[rows] = block["mean"]
+    else:
+        offsets = (block["mean"].astype(np.float64) - section.position_range) * section.step
+        sheet.means[rows] = offsets + section.centers[section.buckets(held.start, held.stop)]
+    sheet.log_scales[rows] = log_scales_of(block["scale"].astype(np.float32))
+    sheet.quats[rows] = block["quat"]
+    sheet.sh0[rows] = (block["rgba"][:, :3].astype(np.float32) / 255 - 0.5) / np.float32(SH_C0)
+    sheet.logit_opacities[rows] = logits_of_bytes()[block["rgba"][:, 3]]
+    values = block["sh"].astype(np.float32)
+    if level == 2:
+        low, high = harmonic_range
+        values = (low + values / 255 * (high - low)).astype(np.float32)
     sheet.shN[rows] = 0
     # Bands follow one another, channel by channel within a band.
     for band in range(1, section.degree + 1):

@@ -260,9 +260,7 @@ def _fill_means(sheet: Splats, archive: _Archive, meta: dict[str, Any], progress
         for c in range(3):
             share = (low[rows, c] + high[rows, c].astype(np.uint16) * 256) / 65535
             value = least[c] + ((most[c] - least[c]) or 1.0) * share
-            # A bound that is too large gives a position that is infinite, which is refused by row.
-            with np.errstate(over="ignore"):
-                sheet.means[rows, c] = np.sign(value) * np.expm1(np.abs(value))
+            sheet.means[rows, c] = np.sign(value) * np.expm1(np.abs(value))
 
 
 def _rotations(pixels: NDArray[np.uint8]) -> NDArray[np.float32]:

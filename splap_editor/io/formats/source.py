@@ -73,7 +73,9 @@ class Source:
             If the name or a link leads elsewhere, or what is there cannot be read or has more bytes.
         """
         advice = "Export it again as one file."
-        if name in ("", "..") or Path(name).name != name or any(mark in name for mark in "\\\0:"):
+        # Half of a surrogate pair, which JSON can hold, is part of no name.
+        is_name = all(mark not in "\\\0:" and not "\ud800" <= mark <= "\udfff" for mark in name)
+        if name in ("", "..") or Path(name).name != name or not is_name:
             raise self.refused(f"keeps its numbers in {name[:80]!r}, which is not beside it", advice)
         path = os.path.realpath(self.path.with_name(name))
         if os.path.dirname(path) != os.path.realpath(self.path.parent):

@@ -167,9 +167,7 @@ def _fill(sheet: Splats, head: _Head, columns: list[NDArray[np.uint8]], progress
     flips = _FLIPS[: head.n_coefficients]
     for lo in range(0, head.n_splats, _BLOCK_ROWS):
         rows = slice(lo, lo + _BLOCK_ROWS)
-        # Half floats of version 1 may be no numbers, which are refused by row.
-        with np.errstate(invalid="ignore"):
-            sheet.means[rows] = _positions(positions[rows], head)
+        sheet.means[rows] = _positions(positions[rows], head)
         sheet.logit_opacities[rows] = logits[opacities[rows, 0]]
         sheet.sh0[rows] = color[colors[rows]]
         sheet.log_scales[rows] = scale[scales[rows]]

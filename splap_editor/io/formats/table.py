@@ -6,6 +6,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import BinaryIO
 
+import numpy as np
+
 from splap_editor.core.camera_path import CameraTrack
 from splap_editor.core.progress import FrameProgress, Progress
 from splap_editor.core.splats.splats import Splats
@@ -98,7 +100,9 @@ class SplatFormat:
             If it is damaged, of an unknown version, or a package for it is missing.
         """
         read: Callable[[Source, Progress], tuple[PlyTable, list[str]]] = _function(self.reads)
-        return read(source, progress)
+        # What stands in a file may be no number, signalling too, or overflow: that is refused by row, once it is read.
+        with np.errstate(all="ignore"):
+            return read(source, progress)
 
     def others(self, source: Source) -> list[str]:
         """Names of the files beside it that hold its numbers.

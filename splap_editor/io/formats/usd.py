@@ -69,8 +69,7 @@ def read(source: Source, progress: Progress) -> tuple[PlyTable, list[str]]:
         sheet.log_scales[rows] = log_scales_of(arrays["scales"][rows])
         sheet.quats[rows] = arrays["quats"][rows]
         alphas = arrays["alphas"][rows].astype(np.float64)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            sheet.logit_opacities[rows] = np.clip(np.log(alphas) - np.log1p(-alphas), FAINT, OPAQUE)
+        sheet.logit_opacities[rows] = np.clip(np.log(alphas) - np.log1p(-alphas), FAINT, OPAQUE)
         sheet.sh0[rows] = harmonics[rows, 0]
         sheet.shN[rows] = harmonics[rows, 1:]
     progress(1.0)

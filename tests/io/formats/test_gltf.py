@@ -4,6 +4,7 @@ import base64
 import io
 import json
 import struct
+import warnings
 
 import numpy as np
 import pytest
@@ -117,6 +118,7 @@ def _replaced(key: str, value: object):
         (_replaced("bufferViews.0.byteOffset", 10**9), "reaches beyond"),
         (_replaced("buffers.0.uri", "../secret.bin"), "not beside it"),
         (_replaced("buffers.0.uri", "/etc/passwd"), "not beside it"),
+        (_replaced("buffers.0.uri", "\ud800"), "not beside it"),
         (_replaced("buffers.0.uri", "nowhere.bin"), "cannot be read"),
         (_replaced("buffers.0.uri", "data:;base64,???"), "not base64"),
         (
@@ -134,3 +136,21 @@ def test_what_makes_no_sense_is_refused(tmp_path, change, words):
     (tmp_path / "bad.glb").write_bytes(glb(document, buffer))
     with pytest.raises(FormatError, match=words):
         read_splats(tmp_path / "bad.glb")
+
+
+def test_signalling_nans_are_refused_by_row_or_held_without_a_warning(tmp_path):
+    splats = scene()
+    document, buffer = parts(splats)
+    attributes = document["meshes"][0]["primitives"][0]["attributes"]
+    for name, number in attributes.items():
+        view = document["bufferViews"][document["accessors"][number]["bufferView"]]
+        start, end = view["byteOffset"], view["byteOffset"] + view["byteLength"]
+        bad = buffer[:start] + struct.pack("<I", 0x7FA00000) * ((end - start) // 4) + buffer[end:]
+        (tmp_path / "bad.glb").write_bytes(glb(document, bad))
+        with warnings.catch_warnings(record=True, action="always") as told:
+            if name == "POSITION":
+                with pytest.raises(ValueError, match="row"):
+                    read_splats(tmp_path / "bad.glb")
+            else:
+                np.testing.assert_array_equal(read_splats(tmp_path / "bad.glb").splats.means, splats.means)
+        assert told == [], name

@@ -100,7 +100,9 @@ def change_meta(folder: Path, change) -> None:
     (folder / "meta.json").write_text(json.dumps(meta))
 
 
-@pytest.mark.parametrize("name", ["../means_l.webp", "/etc/passwd", "a/../../x", "..", "", "c:x.webp", "a\\b", "a\0b"])
+@pytest.mark.parametrize(
+    "name", ["../means_l.webp", "/etc/passwd", "a/../../x", "..", "", "c:x.webp", "a\\b", "a\0b", "a\ud800"]
+)
 def test_a_sog_in_a_folder_reads_nothing_elsewhere(tmp_path, scene, name):
     folder = unbundled(tmp_path, scene)
     (tmp_path / "means_l.webp").write_bytes((folder / "means_l.webp").read_bytes())
