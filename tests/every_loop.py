@@ -19,6 +19,7 @@ from splap_editor.core.splats.floaters import floaters
 from splap_editor.core.splats.spherical_harmonics import view_colors
 from splap_editor.core.splats.splats import Splats
 from splap_editor.core.surface.geodesics import geodesic_distances
+from splap_editor.core.surface.separation import seam_between
 from splap_editor.engine.bound_edit import bind, ready_for_drags
 from splap_editor.engine.edit import Edit, Handle, Pin, Pose
 from splap_editor.engine.surface import Surface, surface_of
@@ -46,6 +47,7 @@ def call_every_loop() -> None:
     normal_offsets(surface.ellipses, surface.graph.edges[:4])
     touch_scales(surface.ellipses, surface.graph.edges[:4], 0.0)
     geodesic_distances(surface.graph, np.array([0]))
+    seam_between(surface.graph, np.array([0]), np.array([len(surface.rest) - 1]))
     # Weights of a few thousand nodes are found without.
     n = len(surface.rest)
     coarser_level(Level(surface.rest, surface.L, surface.M, np.arange(n), np.zeros(0, np.int64)), np.zeros(n, np.bool_))

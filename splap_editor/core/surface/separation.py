@@ -4,13 +4,12 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 
 from splap_editor.core.compressed_rows import gathered
 from splap_editor.core.graph.splat_graph import SplatGraph
 from splap_editor.core.surface.geodesics import geodesic_distances
+from splap_editor.core.surface.minimum_cut import first_side
 
 FIRST_DETOUR = 1.3
 """Ways between the two parts are cut if they are at most so many times as long as the shortest."""
@@ -168,11 +167,11 @@ class _Ways:
         touch = 0.0 if graph.touch is None else graph.touch[entries]
         near = np.minimum(apart[0], apart[1])
         radius = np.maximum(np.maximum(near[tails], near[heads]), graph.lengths[entries])
-        strength = np.ceil(_UNIT * (longest / radius) / (1.0 + touch) ** 2)
+        strength = np.ceil(_UNIT * (longest / radius) / (1.0 + touch) ** 2).astype(np.int64)
         ends = np.stack([number[tails], number[heads]], axis=1)
         # Places pointed at that no way so short leads to have no say.
         first, second = (held[held >= 0] for held in (number[self.first], number[self.second]))
-        side = _first_side(ends, strength, first, second, len(nodes))
+        side = first_side(ends, strength, first, second, len(nodes))
         crossing = side[ends[:, 0]] != side[ends[:, 1]]
         edges = np.stack([tails, heads], axis=1)[crossing]
         # The other entry of each edge that is cut: rows of a symmetric graph are sorted.
@@ -181,24 +180,3 @@ class _Ways:
         ]
         cut = np.concatenate([entries[crossing], np.array(twins, np.int64)])
         return Seam(edges, longest, self.left(cut, longest))
-
-
-def _first_side(
-    edges: NDArray[np.integer],
-    strength: NDArray[np.float64],
-    first: NDArray[np.integer],
-    second: NDArray[np.integer],
-    n: int,
-) -> NDArray[np.bool_]:
-    """(n,) whether a node is on the first part's side of the minimum cut; edges (E, 2) hold up to their strength."""
-    source, sink = n, n + 1
-    tails = np.concatenate([edges[:, 0], edges[:, 1], np.full(len(first), source), second])
-    heads = np.concatenate([edges[:, 1], edges[:, 0], first, np.full(len(second), sink)])
-    plenty = np.full(len(first) + len(second), min(strength.sum() + 1.0, 2.0**31 - 1.0))
-    held = np.concatenate([strength, strength, plenty]).astype(np.int32)
-    capacity = sp.csr_array((held, (tails, heads)), shape=(n + 2, n + 2))
-    residual = capacity - maximum_flow(capacity, source, sink).flow
-    residual.eliminate_zeros()
-    side = np.zeros(n + 2, bool)
-    side[breadth_first_order(residual, source, return_predecessors=False)] = True
-    return side[:n]
