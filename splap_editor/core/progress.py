@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from functools import partial
+from itertools import pairwise
 from typing import Protocol, TypeVar
 
 Result = TypeVar("Result")
@@ -78,3 +80,14 @@ def in_turn(parts: Sequence[Callable[[Progress], Result]], told: Callable[[Seque
         results.append(part(progress_of(number)))
         shares[number] = 1.0
     return results
+
+
+_PARTS = 4
+
+
+def in_parts(function: Callable[[int, int, Progress], None], n: int, progress: Progress, run: Runner) -> None:
+    """Call a function with the bounds, first and end, of each of four parts of n things."""
+    bounds = [number * n // _PARTS for number in range(_PARTS + 1)]
+    parts = [partial(function, first, end) for first, end in pairwise(bounds)]
+    run(parts, lambda shares: progress(sum(shares) / len(parts)))
+    progress(1.0)

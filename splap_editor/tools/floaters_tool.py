@@ -5,6 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from splap_editor.core.index_spaces import FileRows
 from splap_editor.core.options import option
 from splap_editor.session.floater_preview import FloaterPreview
 from splap_editor.session.floater_search import FoundFloaters
@@ -12,9 +13,19 @@ from splap_editor.session.signals import Signal
 from splap_editor.tools.bindings import Binding
 from splap_editor.tools.crop_tool import GOES_TINT
 from splap_editor.tools.tool import KeyEvent, PointerEvent, Tool, ToolContext
+from splap_editor.viewport.overlays import circle
 
 _LIT_TINT = (255, 214, 64, 235)
 """Of the group that is looked at."""
+
+_NEAR_PX = 12.0
+"""A click looks for floaters no farther away than so many logical pixels."""
+
+_LIT_COLOR = (1.0, 0.84, 0.25)
+_RING = "floaters"
+
+_ROOM = 0.08
+"""So much of the scene's extent is seen about a group: a speck alone would fill the picture, and nobody knew where."""
 
 
 @dataclass(frozen=True)
@@ -97,11 +108,24 @@ class FloatersTool(Tool):
         if self._is_dismissed:
             self.begin()
             return True
-        hit = self.context.viewport.pick(*event.xy)
-        group = None if self.found is None or hit is None else self.found.group_of(hit.row)
+        group = self._group_under(event.xy)
         if group is not None:
             self.look_at(group)
         return True
+
+    def _group_under(self, xy: tuple[float, float]) -> int | None:
+        """Group of the splat under a pixel, or of the floater nearest to it: haze lets what is behind it be picked."""
+        found, viewport = self.found, self.context.viewport
+        if found is None or not found.n_groups:
+            return None
+        hit = viewport.pick(*xy)
+        group = None if hit is None else found.group_of(hit.row)
+        if group is None:
+            ways = np.linalg.norm(viewport.screen_points()[found.rows, :2] - xy, axis=1)
+            # Hidden ones are nowhere.
+            if np.fmin.reduce(ways) <= _NEAR_PX * viewport.quality.scale:
+                group = int(found.labels[np.nanargmin(ways)])
+        return group
 
     def step(self, event: KeyEvent) -> bool:
         """Look at the group before, or the next one; the largest first."""
@@ -136,7 +160,19 @@ class FloatersTool(Tool):
         assert self.found is not None
         self.looked_at = group
         self._show()
-        self.context.fly_to(self.context.viewport.frame(self.found.rows_of(group)))
+        self.context.fly_to(self.context.viewport.frame(self.found.rows_of(group), room=_ROOM))
+
+    def _ring_round(self, rows: FileRows | None) -> None:
+        """Ring round a group, which may be too faint or too small for its tint to be seen; None: round none."""
+        rings = self.context.viewport.rings
+        if rows is None:
+            rings.hide(_RING)
+            return
+        scene = self.context.session.shown_scene
+        points = np.asarray(scene.positions[rows], np.float64)
+        middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        radius = np.linalg.norm(points - middle, axis=1).max() + 0.015 * scene.ellipses.scene_scale
+        rings.show(_RING, [circle(middle, axis, radius) for axis in np.eye(3)], _LIT_COLOR, width_px=1.6)
 
     def _hide(self) -> None:
         if self.preview.is_shown:
@@ -162,6 +198,7 @@ class FloatersTool(Tool):
         found = self.found
         if found is None:
             self.looked_at = None
+            self._ring_round(None)
             if self._is_in_use and not self.preview.is_shown:
                 self.context.paint(None)
                 self.context.hud.show()
@@ -171,6 +208,7 @@ class FloatersTool(Tool):
             tints[goes] = GOES_TINT
             if self.looked_at is not None:
                 tints[found.rows_of(self.looked_at)] = _LIT_TINT
+            self._ring_round(None if self.looked_at is None else found.rows_of(self.looked_at))
             self.context.paint(tints)
             self.context.hud.show(text=self.words(int(np.count_nonzero(goes))))
         self.changed.emit()

@@ -157,6 +157,11 @@ class Rings:
         self._actors[name] = actor
         self._renderer.AddActor(actor)
 
+    @property
+    def names(self) -> frozenset[str]:
+        """Names under which something is drawn."""
+        return frozenset(self._actors)
+
     def hide(self, name: str) -> None:
         """Take the loops of a name away, if there are any."""
         actor = self._actors.pop(name, None)

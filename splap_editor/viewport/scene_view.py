@@ -252,8 +252,7 @@ class SceneView:
         scene = self._shown
         if scene is None:
             return
-        flags = np.where(scene.selection, np.uint8(SplatFlag.SELECTED), np.uint8(0))
-        flags |= np.where(scene.unseen, np.uint8(SplatFlag.HIDDEN), np.uint8(0))
+        flags = scene.selection * np.uint8(SplatFlag.SELECTED) | scene.unseen * np.uint8(SplatFlag.HIDDEN)
         self.viewport.splats.set_flags(flags)
 
     def _show_removed(self) -> None:

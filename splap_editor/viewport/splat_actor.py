@@ -204,7 +204,8 @@ class SplatActor:
         self._given: tuple[NDArray[np.floating], ...] | None = None
         self.shape, self.colors, self.flags = self._all.shape, self._all.colors, self._all.flags
         self.vtk_points = self._all.vtk_points
-        self.n_moves = 0
+        self.n_moves = self.n_looks = 0
+        self._box: NDArray[np.float64] | None = None
         self._few_for: tuple[int, int] | None = None
         self._few: _Cloud | None = None
         self._few_rows = np.empty(0, np.int32)
@@ -251,6 +252,7 @@ class SplatActor:
         """
         self._given = (means, axes_u, axes_v)
         self.n_moves += 1
+        self._box = None
         if self._few is None:
             self.settle()
         else:
@@ -304,6 +306,7 @@ class SplatActor:
 
     def set_tints(self, tints: NDArray[np.uint8] | None) -> None:
         """Lay a colour over each splat: (N, 4) uint8, the fourth the share of it; None takes all away."""
+        self.n_looks += tints is not None or self._tints is not None
         self._tints = None if tints is None else np.array(tints, np.uint8)
         self._mix_tints()
 
@@ -424,16 +427,22 @@ class SplatActor:
         self.subject = subject
         self.extent = max(2.0 * float(np.linalg.norm(subject.half_axes)) + 2.0 * self.reach, 1e-9)
         self._counted = None if removed is None or removed.all() else np.flatnonzero(~removed)
+        self._box = None
+        self.n_looks += 1
 
     def bounds(self, *, of_drawn: bool = False) -> NDArray[np.float64]:
         """(2, 3) box around all splats that are not removed, or those drawn, world units, with room for their size."""
         if of_drawn and self._few is not None:
-            low, high = _box(self._few.means)
-        else:
-            low, high = _box(self.means if self._counted is None else self.means[self._counted])
-        return np.array([low - self._room, high + self._room]) + self.origin
+            return self._with_room(_box(self._few.means))
+        if self._box is None:
+            self._box = self._with_room(_box(self.means if self._counted is None else self.means[self._counted]))
+        return self._box
 
     # Inside -------------------------------------------------------------------------------------------------------
+
+    def _with_room(self, box: tuple[NDArray[np.float32], NDArray[np.float32]]) -> NDArray[np.float64]:
+        """(2, 3) box around means, with room for the size of splats, in the world."""
+        return np.array([box[0] - self._room, box[1] + self._room]) + self.origin
 
     def _set_coarseness(self) -> None:
         for uniforms in (self._shaders.GetGeometryCustomUniforms(), self._shaders.GetFragmentCustomUniforms()):

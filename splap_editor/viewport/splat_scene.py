@@ -65,7 +65,8 @@ class SplatScene:
         self._original: SplatActor | None = None
         self._original_colors: NDArray[np.uint8] | None = None
         self._rest: Glyphs | None = None
-        self._subject_rows: FileRows = np.empty(0, np.int64)
+        self._subject: MainSubject | None = None
+        self._subject_rows: FileRows | None = None
         self._removed: FileMask | None = None
         self._flags = np.zeros(0, np.uint8)
         self._highlighted: FileRows | None = None
@@ -94,7 +95,7 @@ class SplatScene:
         self._rest, self._removed = glyphs, None
         subject = subject or main_subject(glyphs.means, np.asarray(colors[:, 3], np.float64) / 255.0)
         self.deformed = SplatActor(glyphs, colors, subject, by_contribution)
-        self._subject_rows = _rows_seen(subject, glyphs.means, self.deformed.reach)
+        self._subject, self._subject_rows = subject, None
         self._renderer.AddActor(self.deformed.actor)
         self._flags = np.zeros(self.deformed.n_splats, np.uint8)
         self.edges = EdgeLines(self.deformed, self._renderer)
@@ -105,7 +106,7 @@ class SplatScene:
         """Frame and clip by another subject of the same scene, and without the splats that are removed (N,)."""
         if self.deformed is None or self._rest is None:
             return
-        self._subject_rows = _rows_seen(subject, self._rest.means, self.deformed.reach)
+        self._subject, self._subject_rows = subject, None
         for actor in (self.deformed, self._original):
             if actor is not None:
                 actor.set_subject(subject, removed)
@@ -164,8 +165,9 @@ class SplatScene:
 
     def set_flags(self, flags: NDArray[np.uint8]) -> None:
         """Overwrite the state (N,) of `SplatFlag` bits: selected, hidden, highlighted."""
-        self._flags = np.array(flags, np.uint8)
-        self._upload_flags()
+        if not np.array_equal(flags, self._flags):
+            self._flags = np.array(flags, np.uint8)
+            self._upload_flags()
 
     def highlight(self, rows: ArrayLike | None) -> None:
         """Let these rows glow, and no others, as under the cursor; set apart from `set_flags`."""
@@ -285,7 +287,12 @@ class SplatScene:
     def subject_points(self) -> NDArray[np.float64]:
         """(n, 3) where the main subject and its sparser parts are in the picture, world units; none without a scene."""
         actor = self.shown
-        return np.empty((0, 3)) if actor is None else actor.means[self._subject_rows] + actor.origin
+        if actor is None or self._subject is None or self._rest is None:
+            return np.empty((0, 3))
+        # Looked for when they are wanted: after a removal nobody waits for them.
+        if self._subject_rows is None:
+            self._subject_rows = _rows_seen(self._subject, self._rest.means, self._loaded.reach)
+        return actor.means[self._subject_rows] + actor.origin
 
     def prepare(
         self,

@@ -193,14 +193,17 @@ class Viewport:
         self.camera.view = self.camera.home = self.frame()
         self.request_render()
 
-    def frame(self, rows: ArrayLike | None = None) -> View:
-        """View in which these splats fill the picture, or the main subject; fly there or assign `camera.view`."""
+    def frame(self, rows: ArrayLike | None = None, *, room: float = 0.02) -> View:
+        """View in which these splats fill the picture, or the main subject; fly there or assign `camera.view`.
+
+        About the splats is some room, a share of the scene's extent.
+        """
         actor = self.splats.shown
         if actor is None:
             return self.camera.view
         if rows is None:
             return self.camera.frame(self.splats.subject_points(), room=actor.reach)
-        return self.camera.frame(actor.means[np.asarray(rows)] + actor.origin, room=0.02 * actor.extent)
+        return self.camera.frame(actor.means[np.asarray(rows)] + actor.origin, room=room * actor.extent)
 
     def frame_everything(self) -> View:
         """View in which all splats are seen, far floaters too."""
@@ -329,7 +332,8 @@ class Viewport:
         look = (self.splats.mode, self.splats.compare, actor, size)
         # Not the clipping planes: they follow from what is drawn.
         camera = projection.view_from_world.tobytes(), projection.clip_from_view[:2].tobytes()
-        shows = (*look, *camera, actor.n_moves)
+        # Where another tint or a removal makes another picture, it need not be all of it at once.
+        shows = (*look, *camera, actor.n_moves, actor.n_looks)
         if look != self._shown[: len(look)]:
             self.quality.forget()
         if shows != self._shown:

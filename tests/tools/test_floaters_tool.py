@@ -76,6 +76,28 @@ def test_strength_changes_the_preview_and_brackets_frame_each_group(hand):
     assert "Nothing floats" in hand.context.hud.text and not hand.key("]")
 
 
+def test_a_click_on_a_floater_or_beside_it_frames_and_rings_its_group_with_room_about_it(hand):
+    tool = looked_for(hand, some_strength(hand))
+    views, rings = [], hand.viewport.rings
+    hand.context.fly_to = views.append
+    screen, found = hand.viewport.screen_points()[:, :2], tool.found
+    hand.click((3, 3))
+    assert tool.looked_at is None and not views and "floaters" not in rings.names
+    middle = np.nanmean(screen, axis=0)
+    # One at the rim of the object: beside it there is nothing to be picked.
+    place = np.nanargmax(np.linalg.norm(screen[found.rows] - middle, axis=1))
+    at = screen[found.rows[place]]
+    hand.click(tuple(at + 8.0 * (at - middle) / np.linalg.norm(at - middle)))
+    assert tool.looked_at is not None and "floaters" in rings.names
+    rows = found.rows_of(tool.looked_at)
+    assert np.linalg.norm(screen[rows] - at, axis=1).min() < 20.0
+    view, scene = views[-1], hand.scene
+    away = np.linalg.norm(view.position - np.asarray(scene.splats.means, np.float64)[rows].mean(axis=0))
+    assert 0.1 * scene.ellipses.scene_scale < away < 2.0 * scene.ellipses.scene_scale
+    hand.key("Esc")
+    assert "floaters" not in rings.names
+
+
 def test_a_group_that_is_kept_stays_and_the_recipe_says_so(hand):
     painted = []
     hand.context.paint = painted.append

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from splap_editor.core.index_spaces import Nodes, Places
-from splap_editor.core.progress import Progress, Runner, in_turn, no_progress
+from splap_editor.core.progress import Progress, Runner, in_parts, in_turn, no_progress
 from splap_editor.core.splats.main_subject import MainSubject
 from splap_editor.core.splats.occupancy import Ellipses
 from splap_editor.core.splats.splats import Splats
@@ -45,6 +45,8 @@ _PER_SQUARE = 512.0
 _BELL = np.exp(-0.5 * np.arange(int(_REACH * _PER_SQUARE) + 3) / _PER_SQUARE)
 """A kernel's values at so many places per squared standard deviation; what lies between is off by less than 1e-6."""
 
+_BLOCK_NODES = 1 << 14
+
 _KEYS = 2.0**32 - 1.0
 _N_SCENE, _N_KERNEL = 14, 8
 
@@ -67,6 +69,11 @@ class Contributions:
 
     weights: NDArray[np.float64]
     peaks: NDArray[np.float64]
+
+
+def shared_by(n: int) -> int:
+    """Into how many parts n splats are divided where each needs to be looked at in some directions only."""
+    return _SHARED_BY if n > MANY else 1
 
 
 def contributions(
@@ -113,8 +120,8 @@ def contributions(
     shown = np.flatnonzero(subject.holds(ellipses.centers, room=_ROOM * subject.size))
     if not len(shown):
         return Contributions(weights, peaks)
-    n_shared = _SHARED_BY if len(shown) > MANY else 1
-    scene = _scene(splats, ellipses, subject, shown, np.sqrt(n_shared))
+    n_shared = shared_by(len(shown))
+    scene = _scene(splats, ellipses, subject, shown, np.sqrt(n_shared), run)
     views, extents = _views(subject)
     width = float(np.clip(_WIDTH_PER_ROOT * np.sqrt(len(shown) / n_shared), *_SIDES))
     pixel = 2.0 * float(extents.max()) / width
@@ -182,32 +189,39 @@ def _frame(subject: MainSubject) -> NDArray[np.float64]:
 
 
 def _scene(
-    splats: Splats, ellipses: Ellipses, subject: MainSubject, nodes: Nodes, growth: float
-) -> NDArray[np.float64]:
+    splats: Splats, ellipses: Ellipses, subject: MainSubject, nodes: Nodes, growth: float, run: Runner
+) -> NDArray[np.float32]:
     """(m, 14) of some nodes: centre from the subject's middle, three scaled axes, opacity, square of where it ends.
 
     The axes are grown by a factor; a splat of two scales has none along its normal.
     """
-    scene, rows = np.zeros((len(nodes), _N_SCENE)), ellipses.rows[nodes]
-    # Copies: what is only read, or lies about in memory, would be another loop.
-    quats, scales, opacities = (np.array(held, np.float64) for held in (splats.quats, splats.scales, splats.opacities))
-    scales *= growth
-    _fill_scene(
-        nodes, rows, np.array(subject.center), ellipses.centers, ellipses.cutoffs, quats, scales, opacities, scene
-    )
+    scene, middle = np.zeros((len(nodes), _N_SCENE), np.float32), np.array(subject.center)
+
+    def fill(first: int, end: int, progress: Progress) -> None:
+        """Fill in the nodes first to end - 1, so many at a time that what is copied of them stays in the cache."""
+        for lo in range(first, end, _BLOCK_NODES):
+            some = nodes[lo : min(lo + _BLOCK_NODES, end)]
+            rows = ellipses.rows[some]
+            # Of one type in every file: another would be another loop.
+            quats, scales = (np.asarray(held[rows], np.float64) for held in (splats.quats, splats.scales))
+            opacities = np.asarray(splats.opacities[rows], np.float64)
+            scales *= growth
+            centers, cutoffs = ellipses.centers[some], ellipses.cutoffs[some]
+            _fill_scene(middle, centers, cutoffs, quats, scales, opacities, scene[lo : lo + len(some)])
+
+    in_parts(fill, len(nodes), no_progress, run)
     return scene
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")
-def _fill_scene(nodes, rows, middle, centers, cutoffs, quats, scales, opacities, scene):
-    """Fill in `_scene` (m, 14) of nodes that have a rotation."""
-    for k in range(len(nodes)):
-        node, row = nodes[k], rows[k]
+def _fill_scene(middle, centers, cutoffs, quats, scales, opacities, scene):
+    """Fill in `_scene` (m, 14) of splats that have a rotation."""
+    for k in range(len(scene)):
         for a in range(3):
-            scene[k, a] = centers[node, a] - middle[a]
+            scene[k, a] = centers[k, a] - middle[a]
         # Dividing by the largest entry first keeps the squared length in range.
-        largest = max(abs(quats[row, 0]), abs(quats[row, 1]), abs(quats[row, 2]), abs(quats[row, 3]))
-        w, x, y, z = quats[row] / largest
+        largest = max(abs(quats[k, 0]), abs(quats[k, 1]), abs(quats[k, 2]), abs(quats[k, 3]))
+        w, x, y, z = quats[k, 0] / largest, quats[k, 1] / largest, quats[k, 2] / largest, quats[k, 3] / largest
         length = np.sqrt(w * w + x * x + y * y + z * z)
         w, x, y, z = w / length, x / length, y / length, z / length
         turned = (
@@ -217,9 +231,9 @@ def _fill_scene(nodes, rows, middle, centers, cutoffs, quats, scales, opacities,
         )
         for axis in range(scales.shape[1]):
             for a in range(3):
-                scene[k, 3 + 3 * axis + a] = turned[axis][a] * scales[row, axis]
-        scene[k, 12] = opacities[row]
-        scene[k, 13] = min(cutoffs[node] ** 2, _REACH)
+                scene[k, 3 + 3 * axis + a] = turned[axis][a] * scales[k, axis]
+        scene[k, 12] = opacities[k]
+        scene[k, 13] = min(cutoffs[k] ** 2, _REACH)
 
 
 def _in_depth(depths: NDArray[np.float64]) -> Places:

@@ -1,5 +1,6 @@
 """What is known of each splat that may float: its neighbours, what hangs together with it, and what it shows."""
 
+from collections.abc import Sequence
 from functools import partial
 
 import numba as nb
@@ -7,13 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from splap_editor.core.progress import Progress, Runner, StageProgress, in_turn, part_of, silent
-from splap_editor.core.splats.contributions import Contributions, contributions
+from splap_editor.core.index_spaces import NodeMask
+from splap_editor.core.progress import Progress, Runner, StageProgress, in_parts, in_turn, part_of, silent
+from splap_editor.core.splats.contributions import Contributions, contributions, shared_by
 from splap_editor.core.splats.main_subject import MainSubject
 from splap_editor.core.splats.occupancy import Ellipses
 from splap_editor.core.splats.smallest_box import smallest_box
 from splap_editor.core.splats.splats import Splats
-from splap_editor.core.splats.surroundings import LOCAL, Surroundings, Ties, bounded_logits, surroundings
+from splap_editor.core.splats.surroundings import (
+    LOCAL,
+    Surroundings,
+    Ties,
+    bounded_logits,
+    log_opacities,
+    surroundings,
+)
 
 _FAINT = 0.3
 """Share of its neighbours' usual opacity from which a splat is solid: haze ties nothing together."""
@@ -23,6 +32,8 @@ _BODY = 0.02
 
 _NEAR = 1.0
 """The body is looked for no farther from the subject's box than so many times its size."""
+
+_BLOCK_NODES = 1 << 14
 
 _SAMPLE = 40_000
 """So many splats tell how far the body reaches."""
@@ -88,9 +99,9 @@ def floater_evidence(
         return np.zeros((n, len(EVIDENCE)), np.float32), Ties(np.empty((n, 0), np.int32), np.empty((n, 0), np.bool_))
     progress = stages("floaters")
     around = surroundings(ellipses, progress=part_of(progress, 0.0, 0.7), run=run)
-    logs = np.log(np.maximum(ellipses.opacities, 1e-3))
-    is_solid = logs >= np.log(_FAINT) + logs[around.neighbors].mean(axis=1)
-    pieces = [ties.pieces(is_solid) for ties in (around.narrow, around.wide)]
+    is_solid = log_opacities(ellipses) >= np.log(_FAINT) + around.near_log_opacities
+    narrow, wide = run([partial(_pieces, ties, is_solid) for ties in (around.narrow, around.wide)], _unheard)
+    pieces = [narrow, wide]
     subject = _whole_subject(ellipses, pieces[-1])
     shown = contributions(splats, ellipses, subject=subject, progress=stages("contributions"), run=run)
     progress(0.8)
@@ -123,30 +134,71 @@ def _columns(
     """(n, 27) the evidence, column by column in memory."""
     n, logits = ellipses.n_nodes, bounded_logits(ellipses)
     weights = shown.weights / max(shown.weights.sum(), 1e-300)
-    minor = np.sqrt(np.einsum("ij,ij->i", ellipses.semi_axes[:, 1], ellipses.semi_axes[:, 1]))
-    opacities = 1.0 / (1.0 + np.exp(-logits))
-    areas = np.maximum(ellipses.reaches * minor / subject.size**2, 1e-30) * opacities
-    evidence = np.empty((len(EVIDENCE), n), np.float32).T
-    evidence[:, : len(LOCAL)] = around.local
-    for column, least, most in _BOUNDS:
-        np.clip(evidence[:, column], least, most, out=evidence[:, column])
-    columns = [
-        logits,
-        np.log(np.clip(weights * n, 1e-3, 30.0)),
-        np.log(np.clip(shown.weights / areas, 1e-3, 10.0)),
-        shown.peaks,
-        np.clip(_beyond(subject, ellipses.centers) / subject.size, 0.0, 0.5),
-    ]
     known = around, ellipses.centers, weights, subject.size
     parts = [partial(_piece_evidence, labels, *known) for labels in pieces]
-    for labels, found in zip(pieces, run(parts, lambda shares: progress(sum(shares) / len(parts))), strict=True):
-        columns += [column[labels] for column in found]
-    labels, counts = pieces[-1], np.bincount(pieces[-1])
-    for column in (*around.local.T[[2, 5, 3]], logits, around.local[:, 1]):
-        columns.append((np.bincount(labels, column) / counts)[labels])
-    for at, column in enumerate(columns, start=len(LOCAL)):
-        evidence[:, at] = column
+    of_pieces = run(parts, lambda shares: progress(0.5 * sum(shares) / len(parts)))
+    counts = np.bincount(pieces[-1])
+    means = [
+        partial(_means, pieces[-1], counts, held) for held in (*around.local.T[[2, 5, 3]], logits, around.local[:, 1])
+    ]
+    of_pieces.append(tuple(run(means, _unheard)))
+    evidence = np.empty((len(EVIDENCE), n), np.float32).T
+
+    def fill(first: int, end: int, progress: Progress) -> None:
+        """Fill in the evidence of nodes first to end - 1, so many at a time that they stay in the cache."""
+        for lo in range(first, end, _BLOCK_NODES):
+            progress((lo - first) / (end - first))
+            some = slice(lo, min(lo + _BLOCK_NODES, end))
+            own = _own_evidence(ellipses, subject, shown, weights[some] * n, logits[some], some)
+            evidence[some, : len(LOCAL)] = around.local[some]
+            for column, least, most in _BOUNDS:
+                np.clip(evidence[some, column], least, most, out=evidence[some, column])
+            labels = (pieces[0][some], pieces[1][some], pieces[1][some])
+            shared = (held[of] for of, told in zip(labels, of_pieces, strict=True) for held in told)
+            for column, values in enumerate((*own, *shared), start=len(LOCAL)):
+                evidence[some, column] = values
+
+    in_parts(fill, n, part_of(progress, 0.5, 1.0), run)
     return evidence
+
+
+def _own_evidence(
+    ellipses: Ellipses,
+    subject: MainSubject,
+    shown: Contributions,
+    relative: NDArray[np.float64],
+    logits: NDArray[np.float64],
+    some: slice,
+) -> tuple[NDArray[np.float64], ...]:
+    """From the opacity to how far beyond the subject, (m,) each, of some nodes; ``relative`` is to mean weights."""
+    minor = np.sqrt(np.einsum("ij,ij->i", ellipses.semi_axes[some, 1], ellipses.semi_axes[some, 1]))
+    opacities = 1.0 / (1.0 + np.exp(-logits))
+    areas = np.maximum(ellipses.reaches[some] * minor / subject.size**2, 1e-30) * opacities
+    return (
+        logits,
+        np.log(np.clip(relative, 1e-3, 30.0)),
+        np.log(np.clip(shown.weights[some] / areas, 1e-3, 10.0)),
+        shown.peaks[some],
+        np.clip(_beyond(subject, ellipses.centers[some]) / subject.size, 0.0, 0.5),
+    )
+
+
+def _pieces(ties: Ties, is_solid: NodeMask, progress: Progress) -> NDArray[np.int32]:
+    """(n,) piece of each node, as a part of the work."""
+    progress(0.0)
+    return ties.pieces(is_solid)
+
+
+def _means(
+    labels: NDArray[np.int32], counts: NDArray[np.integer], values: NDArray[np.float64], progress: Progress
+) -> NDArray[np.float64]:
+    """(p,) mean over the nodes of each piece, as a part of the work."""
+    progress(0.0)
+    return np.bincount(labels, values) / counts
+
+
+def _unheard(shares: Sequence[float]) -> None:
+    """Report nothing of what is soon done."""
 
 
 def _beyond(subject: MainSubject, centers: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -186,6 +238,8 @@ def _piece_evidence(
     rest = np.flatnonzero(np.isinf(ways)[labels])
     if len(rest):
         body = np.flatnonzero(is_body[labels])
+        # Of very many, every fifth along the curve tells as well how far away they are.
+        body = body[:: shared_by(n)]
         found, at = cKDTree(centers[body], balanced_tree=False).query(centers[rest])
         unit = np.maximum(np.maximum(spacings[rest], spacings[body[at]]), least)
         np.minimum.at(gaps, labels[rest], found / unit)

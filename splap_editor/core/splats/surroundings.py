@@ -3,10 +3,7 @@
 Everything is measured in the splat's own spacing and size, or its neighbours': captures are not equally dense.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
-from itertools import pairwise
 
 import numba as nb
 import numpy as np
@@ -14,16 +11,13 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from splap_editor.core.index_spaces import NodeMask
-from splap_editor.core.progress import Progress, Runner, in_turn, no_progress, part_of
+from splap_editor.core.progress import Progress, Runner, in_parts, in_turn, no_progress, part_of
 from splap_editor.core.splats.occupancy import Ellipses
 
 N_NEAREST = 8
 """Neighbours in space that a splat is compared with."""
 
 _BLOCK_NODES = 1 << 16
-
-_PARTS = 4
-"""Into so many the splats are split, to be looked at side by side."""
 
 THICKNESS = 0.1
 """How far a splat reaches out of its plane, in units of its larger semi-axis."""
@@ -109,12 +103,15 @@ class Surroundings:
         Of the nearest nodes, ascending, in world units.
     local : (n, 9) float64
         `LOCAL` of each.
+    near_log_opacities : (n,) float64
+        Mean logarithm of the nearest nodes' opacities; those below 0.001 count as such.
     narrow, wide : Ties
         By either measure.
     """
 
     distances: NDArray[np.float64]
     local: NDArray[np.float64]
+    near_log_opacities: NDArray[np.float64]
     narrow: Ties
     wide: Ties
 
@@ -138,16 +135,23 @@ def surroundings(ellipses: Ellipses, *, progress: Progress = no_progress, run: R
     n, centers = ellipses.n_nodes, ellipses.centers
     neighbors, distances = nearest(centers, part_of(progress, 0.0, 0.75), run)
     # Column by column: they are looked at one at a time.
-    local, ties = np.empty((len(LOCAL), n)), np.zeros((len(STRAY), *neighbors.shape), np.bool_)
+    local, ties = np.empty((len(LOCAL) + 1, n)), np.empty((len(STRAY), *neighbors.shape), np.bool_)
     reaches = np.maximum(ellipses.reaches, 1e-12 * ellipses.scene_scale)
-    known = neighbors, distances, centers, ellipses.semi_axes, ellipses.normals, reaches, bounded_logits(ellipses)
+    with np.errstate(divide="ignore"):
+        logs = np.stack([np.log(distances[:, -1]), np.log(reaches), log_opacities(ellipses), bounded_logits(ellipses)])
+    known = neighbors, distances, centers, ellipses.semi_axes, ellipses.normals, reaches, logs.T.copy()
 
     def look(first: int, end: int, progress: Progress) -> None:
         """Take what is told by the surroundings of nodes first to end - 1."""
         _local(first, end, *known, np.array(STRAY), local, ties)
 
     in_parts(look, n, part_of(progress, 0.75, 1.0), run)
-    return Surroundings(distances, local.T, Ties(neighbors, ties[0]), Ties(neighbors, ties[1]))
+    return Surroundings(distances, local[:-1].T, local[-1], Ties(neighbors, ties[0]), Ties(neighbors, ties[1]))
+
+
+def log_opacities(ellipses: Ellipses) -> NDArray[np.float64]:
+    """(n,) logarithms of opacities, those of hardly visible splats a little within."""
+    return np.log(np.maximum(ellipses.opacities, 1e-3))
 
 
 def bounded_logits(ellipses: Ellipses) -> NDArray[np.float64]:
@@ -171,40 +175,39 @@ def nearest(
             some = slice(lo, min(lo + _BLOCK_NODES, end))
             found, at = tree.query(centers[some], k + 1)
             found, at = found.reshape(-1, k + 1), at.reshape(-1, k + 1)
+            neighbors[some], distances[some] = at[:, 1:], found[:, 1:]
             # Of centres that coincide, the splat itself need not be the first.
-            own = at == np.arange(lo, lo + len(at))[:, None]
-            own[~own.any(axis=1), -1] = True
-            neighbors[some], distances[some] = at[~own].reshape(-1, k), found[~own].reshape(-1, k)
+            odd = np.flatnonzero(at[:, 0] != np.arange(lo, lo + len(at)))
+            if len(odd):
+                own = at[odd] == (lo + odd)[:, None]
+                own[~own.any(axis=1), -1] = True
+                neighbors[lo + odd], distances[lo + odd] = (held[odd][~own].reshape(-1, k) for held in (at, found))
             progress((some.stop - first) / (end - first))
 
     in_parts(search, n, progress, run)
     return neighbors, distances
 
 
-def in_parts(function: Callable[[int, int, Progress], None], n: int, progress: Progress, run: Runner) -> None:
-    """Call a function with the bounds of each of some parts of the nodes."""
-    parts = [partial(function, first, end) for first, end in pairwise(np.linspace(0, n, _PARTS + 1).astype(int))]
-    run(parts, lambda shares: progress(sum(shares) / len(parts)))
-    progress(1.0)
-
-
 @nb.njit(nogil=True, cache=True, error_model="numpy")
-def _local(first, end, neighbors, distances, centers, semi_axes, normals, reaches, logits, stray, found, ties):
-    """Fill `LOCAL` (9, n), and for each measure of straying whether a neighbour is tied to the splat (n, k).
+def _local(first, end, neighbors, distances, centers, semi_axes, normals, reaches, logs, stray, found, ties):
+    """Fill `LOCAL` and the mean log-opacity of the nearest (10, n), and who is tied to it by each measure (n, k).
 
-    For the nodes from ``first`` to ``end``.
+    For the nodes from ``first`` to ``end``. ``logs`` (n, 4) are the logarithms of spacing, reach and opacity, and the
+    opacity's logit.
     """
     k = neighbors.shape[1]
     for i in range(first, end):
         spacing, own = distances[i, k - 1], reaches[i]
-        spacings = mutual = out = flat = aligned = sizes = opacities = contacts = 0.0
+        least_log = logs[i, 1] + np.log(1e-6)
+        spacings = mutual = out = flat = aligned = sizes = log_opacities = opacities = contacts = 0.0
         for c in range(k):
             j = neighbors[i, c]
             d = distances[i, c]
             other = distances[j, k - 1]
-            spacings += np.log(max(other, 1e-6 * own))
-            sizes += np.log(reaches[j])
-            opacities += logits[j]
+            spacings += max(logs[j, 0], least_log)
+            sizes += logs[j, 1]
+            log_opacities += logs[j, 2]
+            opacities += logs[j, 3]
             mutual += d <= other
             along_i = along_j = across_i = across_j = over_i = over_j = agree = 0.0
             for a in range(3):
@@ -229,7 +232,8 @@ def _local(first, end, neighbors, distances, centers, semi_axes, normals, reache
             least = min(spacing, other)
             for m in range(2):
                 ties[m, i, c] = touches and d <= stray[m] * least
-        found[0, i] = np.log(max(spacing, 1e-6 * own)) - spacings / k
-        found[1, i] = np.log(max(spacing, 1e-6 * own) / own)
+        log_spacing = max(logs[i, 0], least_log)
+        found[0, i], found[1, i] = log_spacing - spacings / k, log_spacing - logs[i, 1]
         found[2, i], found[3, i], found[4, i], found[5, i] = mutual / k, out / k, flat / k, aligned / k
-        found[6, i], found[7, i], found[8, i] = np.log(own) - sizes / k, logits[i] - opacities / k, contacts / k
+        found[6, i], found[7, i], found[8, i] = logs[i, 1] - sizes / k, logs[i, 3] - opacities / k, contacts / k
+        found[9, i] = log_opacities / k
