@@ -1,14 +1,15 @@
-"""How soon a job that is cancelled ends, whatever it reads and whenever it is told, as JSON lines.
+"""How soon a job that is cancelled ends, whatever it reads or writes and whenever it is told, as JSON lines.
 
 ::
 
     python -m tests.benchmark.cancel
     python -m tests.benchmark.cancel --kinds spz session --splats 200000 --moments 8 --gaps 5
 
-Each file is opened as the window opens it, on a thread of its own. ``worst_gap_s`` is the longest that the thread ran
-without asking whether it shall stop: no moment of cancelling is worse. ``cancelled_s`` are latencies that were seen, at
-moments drawn at random. Both are of the thread's own processor time, which other programs on the machine do not
-lengthen; what waits for another process is judged by ``wall_s``.
+Each file is opened as the window opens it, on a thread of its own; those of ``save_…`` are written as it exports them,
+every splat moved, and the time runs until nothing of the file is left. ``worst_gap_s`` is the longest that the thread
+ran without asking whether it shall stop: no moment of cancelling is worse. ``cancelled_s`` are latencies that were
+seen, at moments drawn at random. Both are of the thread's own processor time, which other programs on the machine do
+not lengthen; what waits for another process is judged by ``wall_s``.
 """
 
 import argparse
@@ -24,17 +25,28 @@ from typing import Any
 
 import numpy as np
 
-from splap_editor.core.splats.occupancy import occupancy_ellipses
+from splap_editor.core.place import Place
+from splap_editor.core.splats.occupancy import Ellipses, occupancy_ellipses
 from splap_editor.core.splats.splats import Splats
+from splap_editor.engine.edit import Edit
 from splap_editor.io.formats.splat32 import RECORD
 from splap_editor.io.ply import SplatFile, read_ply
+from splap_editor.io.sample_maker import write_sample
 from splap_editor.io.session_file import read_session_file
 from splap_editor.resources import resource
+from splap_editor.session.bound_edit import snapshot_of
 from splap_editor.session.depictor import Unseen
 from splap_editor.session.edit_file import read_edit
 from splap_editor.session.jobs import Job, Starter
 from splap_editor.session.scene import Scene
-from splap_editor.session.work import OpenRequest, opened_scene, told_finder
+from splap_editor.session.work import (
+    ExportOrder,
+    ExportRequest,
+    OpenRequest,
+    exported_file,
+    opened_scene,
+    told_finder,
+)
 from tests.benchmark.peers import machine, note, report
 from tests.campaign.seeds import ksplat_bytes, splat_records
 from tests.reference.ply import ply_bytes, splat_columns
@@ -183,6 +195,45 @@ class Inputs:
         path.write_bytes(ksplat_bytes(self.n_splats, self.rng))
         return opened(path)
 
+    def _saved(self, name: str) -> Work:
+        """Export splats of degree 3, all of them moved."""
+        path = self.folder / "scene.ply"
+        write_sample(path, splats_of(self.n_splats, 3, self.rng))
+        scene = Scene(*_seen(path))
+        edit = Edit(place=Place(translate=(1.0, 0.0, 0.0)))
+        request = ExportRequest(
+            ExportOrder(self.folder / name), scene, edit, scene.file, None, snapshot_of(scene, None)
+        )
+        return lambda job: exported_file(job, request)
+
+    def save_ply(self) -> Work:
+        """To a PLY."""
+        return self._saved("out.ply")
+
+    def save_compressed_ply(self) -> Work:
+        """To SuperSplat's."""
+        return self._saved("out.compressed.ply")
+
+    def save_spz(self) -> Work:
+        """To Niantic's."""
+        return self._saved("out.spz")
+
+    def save_sog(self) -> Work:
+        """To PlayCanvas'."""
+        return self._saved("out.sog")
+
+    def save_glb(self) -> Work:
+        """To binary glTF."""
+        return self._saved("out.glb")
+
+    def save_usdc(self) -> Work:
+        """To an OpenUSD layer."""
+        return self._saved("out.usdc")
+
+    def save_usdz(self) -> Work:
+        """To an OpenUSD package."""
+        return self._saved("out.usdz")
+
     def recipe(self) -> Work:
         """A recipe of row numbers, near the largest that is read."""
         scene = self._scene()
@@ -237,8 +288,12 @@ class Inputs:
         return lambda job: read_session_file(path, job.progress("reading the session"))
 
     def _scene(self) -> Scene:
-        file = read_ply(resource("samples", "bench_2dgs.ply"))
-        return Scene(file, occupancy_ellipses(file.splats))
+        return Scene(*_seen(resource("samples", "bench_2dgs.ply")))
+
+
+def _seen(path: Path) -> tuple[SplatFile, Ellipses]:
+    file = read_ply(path)
+    return file, occupancy_ellipses(file.splats)
 
 
 KINDS = [name for name in vars(Inputs) if not name.startswith("_")]
