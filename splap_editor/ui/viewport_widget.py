@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 os.environ.setdefault("QT_API", "pyside6")
 
-from PySide6.QtCore import QCoreApplication, QEvent, Qt, QTimer, Signal
+from PySide6.QtCore import QCoreApplication, QEvent, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import (
     QFocusEvent,
     QKeyEvent,
@@ -33,6 +33,9 @@ BUTTONS = {
 NOTCH = 120.0
 PINCH_NOTCH = log(1.15)
 COMPARE_KEY = "O"
+LEAST_PX = QSize(200, 120)
+"""Of the picture: beside tools and panels there is no more on a small screen at twice the scale."""
+
 
 PointerTaker = Callable[[PointerEvent], bool]
 KeyTaker = Callable[[KeyEvent], bool]
@@ -76,7 +79,7 @@ class ViewportWidget(QtInteractor):
         self.reset_key_events()
         interactor.RemoveObservers("CharEvent")
         self.setAcceptDrops(False)
-        self.setMinimumSize(320, 240)
+        self.setMinimumSize(LEAST_PX)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setMouseTracking(True)
         # Of the positions that come in during a slow frame Qt would pass on the last only: a lasso would lose its

@@ -17,6 +17,9 @@ from splap_editor.ui.widgets.plain_text import PlainLabel
 NARROW_PX = 720
 """A strip narrower than this has its ruler in a line of its own."""
 
+NARROWEST_PX = 360
+"""Narrower than this, length and speed have a line of their own too."""
+
 
 class TimelineStrip(QWidget):
     """Shows the timeline of the edit on screen; hidden until it is asked for or a key is set.
@@ -46,22 +49,16 @@ class TimelineStrip(QWidget):
         self._grid.setContentsMargins(2 * STEP, STEP, 2 * STEP, STEP)
         self._grid.setHorizontalSpacing(STEP)
         self._grid.setVerticalSpacing(0)
-        line: list[QWidget] = []
+        self._line: list[QWidget] = []
         for action_id in ("timeline.play", "timeline.set_key", "timeline.set_camera_key"):
             button = QToolButton()
             button.setDefaultAction(actions[action_id])
             button.setIconSize(QSize(18, 18))
-            line.append(button)
-        line.append(self.frame_field)
-        self._column = len(line)
-        for k, widget in enumerate(line):
-            self._grid.addWidget(widget, 0, k)
-        after = (self.length_field, PlainLabel("at"), self.fps_field, PlainLabel("fps"))
-        for k, widget in enumerate(after, self._column + 1):
-            self._grid.addWidget(widget, 0, k)
-        self._grid.setColumnStretch(self._column, 1)
-        self._is_narrow: bool | None = None
-        self._arrange(is_narrow=False)
+            self._line.append(button)
+        self._line.append(self.frame_field)
+        self._after = [self.length_field, PlainLabel("at"), self.fps_field, PlainLabel("fps")]
+        self._n_lines = 0
+        self._arrange(1)
         self.ruler.scrubbed.connect(timeline.scrub)
         self.ruler.chosen.connect(timeline.go_to)
         self.ruler.key_moved.connect(timeline.move_key)
@@ -76,20 +73,39 @@ class TimelineStrip(QWidget):
         SceneFollower(session, self._show, edit_changed=self._show, preview_changed=self._show)
         self.hide()
 
+    def minimumSizeHint(self) -> QSize:
+        """The width of its narrowest arrangement, in which alone it is that narrow."""
+        margins, space = self._grid.contentsMargins(), self._grid.horizontalSpacing()
+        columns = zip(self._line, self._after, strict=True)
+        # Of a field that is given its width, the hint is of another.
+        widths = [max(min(w.minimumSizeHint().width(), w.maximumWidth()) for w in column) for column in columns]
+        least = margins.left() + sum(widths) + space * len(widths) + margins.right()
+        return QSize(least, super().minimumSizeHint().height())
+
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Put the ruler between the fields, or under them where they leave it too little room."""
-        self._arrange(is_narrow=event.size().width() < NARROW_PX)
+        width = event.size().width()
+        self._arrange(1 if width >= NARROW_PX else 2 if width >= NARROWEST_PX else 3)
         super().resizeEvent(event)
 
-    def _arrange(self, *, is_narrow: bool) -> None:
-        if is_narrow == self._is_narrow:
+    def _arrange(self, n_lines: int) -> None:
+        """Lay buttons, fields and ruler out in so many lines."""
+        if n_lines == self._n_lines:
             return
-        self._is_narrow = is_narrow
-        self._grid.removeWidget(self.ruler)
-        if is_narrow:
-            self._grid.addWidget(self.ruler, 1, 0, 1, self._grid.columnCount())
+        self._n_lines = n_lines
+        stretched, n_columns = len(self._line), len(self._line) + 1 + len(self._after)
+        for widget in (*self._line, self.ruler, *self._after):
+            self._grid.removeWidget(widget)
+        for k, widget in enumerate(self._line):
+            self._grid.addWidget(widget, 0, k)
+        for k, widget in enumerate(self._after, stretched + 1 if n_lines < 3 else 0):
+            self._grid.addWidget(widget, n_lines // 3, k)
+        if n_lines == 1:
+            self._grid.addWidget(self.ruler, 0, stretched)
         else:
-            self._grid.addWidget(self.ruler, 0, self._column)
+            self._grid.addWidget(self.ruler, n_lines - 1, 0, 1, n_columns)
+        for k in range(n_columns):
+            self._grid.setColumnStretch(k, int(k == stretched))
 
     def _show(self) -> None:
         timeline = self._session.shown_scene.shown_edit.timeline

@@ -45,7 +45,7 @@ class RecoveryBar(QFrame):
         mark.setPixmap(icon("warning").pixmap(16, 16))
         layout = QHBoxLayout(self)
         layout.setContentsMargins(3 * STEP, STEP, 3 * STEP, STEP)
-        layout.setSpacing(2 * STEP)
+        layout.setSpacing(STEP)
         layout.addWidget(mark)
         layout.addWidget(self._text, 1)
         layout.addWidget(self.restore_button)

@@ -1,10 +1,21 @@
 """The bar over the viewport: options of the chosen tool at the left, the display at the right."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QSizePolicy, QToolBar, QToolButton, QWidget
+from PySide6.QtGui import QResizeEvent, QShowEvent
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QFrame,
+    QHBoxLayout,
+    QScrollArea,
+    QSizePolicy,
+    QToolBar,
+    QToolButton,
+    QWidget,
+)
 
 from splap_editor.tools.tool import Held
 from splap_editor.tools.tool_manager import ToolManager
@@ -23,6 +34,9 @@ BUTTONS = (
     ("handle.local", "view.orthographic", "view.frame_selection"),
 )
 """Those at the end are the first to make room."""
+LEAST_OPTIONS_PX = 80
+"""A field and its name."""
+
 TITLES = {entry.name: entry.title for entry in TOOLS}
 
 
@@ -45,22 +59,54 @@ class ToolOptionsBar(QWidget):
         self._title.setStyleSheet("font-weight: 600;")
         kinds = dict.fromkeys(kind for tool in tools.tools.values() for kind in tool.option_kinds)
         self.forms = {kind: HeldForm(tools.context.held(kind)) for kind in kinds}
-        layout = QHBoxLayout(self)
+        self._strip = _strip(actions)
+        self._row = _row(self.forms.values())
+        self._options = _scrolled(self._row)
+        self._layout = layout = QHBoxLayout(self)
         layout.setContentsMargins(3 * STEP, STEP, 2 * STEP, STEP)
         layout.setSpacing(2 * STEP)
         layout.addWidget(self._title)
-        for form in self.forms.values():
-            layout.addWidget(form)
+        layout.addWidget(self._options)
         layout.addStretch(1)
-        layout.addWidget(_strip(actions))
+        layout.addWidget(self._strip)
         tools.chosen_changed.connect(self._show)
         self._show()
+
+    def minimumSizeHint(self) -> QSize:
+        """The width at which options are scrolled and all buttons but two are put away."""
+        return QSize(self._least_width + LEAST_OPTIONS_PX, super().minimumSizeHint().height())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Give the options what they take, and the buttons the rest."""
+        self._fit()
+        super().resizeEvent(event)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Fit what is shown for the first time."""
+        super().showEvent(event)
+        self._fit()
+
+    @property
+    def _least_width(self) -> int:
+        """What all takes but the options."""
+        margins, space = self._layout.contentsMargins(), 2 * self._layout.spacing()
+        least = self._title.minimumSizeHint().expandedTo(self._title.minimumSize()).width()
+        return margins.left() + least + space + self._strip.minimumSizeHint().width() + margins.right()
+
+    def _fit(self) -> None:
+        # Before it is shown a tool bar has other sizes, and keeps what it was asked for.
+        if not self.isVisible():
+            return
+        self._options.setFixedHeight(self._strip.sizeHint().height())
+        room = max(self.width() - self._least_width, LEAST_OPTIONS_PX)
+        self._options.setFixedWidth(min(self._row.sizeHint().width(), room))
 
     def _show(self) -> None:
         chosen = self._tools.chosen
         for kind, form in self.forms.items():
             form.setVisible(kind in chosen.option_kinds)
         self._title.setText(TITLES[chosen.name])
+        self._fit()
 
 
 class HeldForm(QWidget):
@@ -122,6 +168,26 @@ class HeldForm(QWidget):
                 editor.setCurrentIndex(editor.findData(value))
             elif isinstance(editor, NumberField):
                 editor.show_value(self._hints[name].factor * value)
+
+
+def _row(forms: Iterable[HeldForm]) -> QWidget:
+    """Forms beside each other."""
+    row = QWidget()
+    layout = QHBoxLayout(row)
+    layout.setContentsMargins(0, 0, 0, 0)
+    layout.setSpacing(2 * STEP)
+    for form in forms:
+        layout.addWidget(form)
+    return row
+
+
+def _scrolled(row: QWidget) -> QScrollArea:
+    """A row that is scrolled sideways where a small window has no room for all of it."""
+    options = QScrollArea(widgetResizable=True)
+    options.setFrameShape(QFrame.Shape.NoFrame)
+    options.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    options.setWidget(row)
+    return options
 
 
 def _strip(actions: ActionSet) -> QToolBar:
