@@ -5,6 +5,7 @@
     python -m tests.benchmark.floaters                       # objects, kinds and seeds that nothing was fitted on
     python -m tests.benchmark.floaters --captures FOLDER     # the captures of a folder among them, and as they are
     python -m tests.benchmark.floaters --many                # by pictures as of more than 200,000 splats
+    python -m tests.benchmark.floaters --large 260000        # scenes that truly have that many
     python -m tests.benchmark.floaters --fit                 # print the numbers of core/splats/floater_weights.py
 """
 
@@ -48,6 +49,7 @@ HELD_OUT = (
 
 _CATEGORIES = ("harp", "ferris wheel", "fence", "headphone", "basket", "bed")
 _FIRST_SEED = {FITTED: 100, HELD_OUT: 900}
+_LARGE_SEED = 1900
 
 
 def with_floaters(splats: Splats, seed: int) -> tuple[Splats, NDArray[np.bool_]]:
@@ -128,6 +130,14 @@ def made_scenes(names: tuple[str, ...], folder: Path | None) -> Iterator[tuple[s
             yield name, kind, *with_floaters(made(clean, np.random.default_rng(seed)), seed)
 
 
+def large_scenes(n: int) -> Iterator[tuple[str, str, Splats, NDArray[np.bool_]]]:
+    """An object that nothing was fitted on of n splats, in two kinds of scene."""
+    clean = surface_splats(made_object("bed", 5).surface, n, STYLES["trained"], seed=5).splats
+    for kind in ("even", "thin bars"):
+        made = KINDS[kind](clean, np.random.default_rng(_LARGE_SEED))
+        yield f"bed trained of {n:,}", kind, *with_floaters(made, _LARGE_SEED)
+
+
 def fitted_model(scenes: list[tuple[NDArray[np.float64], NDArray[np.bool_]]]) -> tuple[NDArray[np.float64], ...]:
     """Centres, spreads and weights of the logistic model: every scene counts alike, its floaters for a quarter."""
     rng = np.random.default_rng(3)
@@ -163,18 +173,20 @@ def main() -> None:
     parser.add_argument("--fit", action="store_true", help="fit the model on the objects for it")
     parser.add_argument("--captures", type=Path, metavar="FOLDER", help="captures to find floaters in as they are")
     parser.add_argument("--many", action="store_true", help="look at each scene as at one of very many splats")
+    parser.add_argument("--large", type=int, metavar="N", help="scenes of so many splats instead")
     options = parser.parse_args()
     if options.many:
         contributions.MANY = 0
     if options.fit:
-        scenes = []
+        known_of = []
         for _, _, splats, is_floater in made_scenes(FITTED, None):
             ellipses = occupancy_ellipses(splats)
-            scenes.append((floater_evidence(splats, ellipses)[0], is_floater[ellipses.rows]))
-        _tell_model(*fitted_model(scenes))
+            known_of.append((floater_evidence(splats, ellipses)[0], is_floater[ellipses.rows]))
+        _tell_model(*fitted_model(known_of))
         return
     known = defaultdict(list)
-    for name, kind, splats, is_floater in made_scenes(HELD_OUT, options.captures):
+    scenes = large_scenes(options.large) if options.large else made_scenes(HELD_OUT, options.captures)
+    for name, kind, splats, is_floater in scenes:
         ellipses, made = found_in(splats)
         found, truth = made.at(STRENGTH), is_floater[ellipses.rows]
         hits = (found & truth).sum()
