@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import splap_editor
 from splap_editor.arranging_cli import add_grade, add_merge
 from splap_editor.cleaning_cli import add_clean, add_place
+from splap_editor.core.adaptation.options import USUAL_REPAIR
 from splap_editor.installation import commands as installation
 from splap_editor.session.background_thread import leave
 from splap_editor.stage_report import ShareLine, StageReport, printable
@@ -130,6 +131,14 @@ def _add_deform(deform: argparse.ArgumentParser) -> None:
         help=_AS_3DGS,
     )
     deform.add_argument("--columns", default="", metavar="NAMES", help="also write quantities: displacement,stretch")
+    deform.add_argument(
+        "--repair",
+        nargs="?",
+        const=USUAL_REPAIR,
+        type=float,
+        metavar="LIMIT",
+        help=f"split splats drawn out to more than LIMIT times their length, {USUAL_REPAIR} by default",
+    )
     deform.add_argument("--report", action="store_true", help="say where the pose tears or draws out the surface")
     deform.add_argument("--no-cache", action="store_true", help="neither read nor keep graph and Laplacian")
     _add_output(deform)
@@ -220,7 +229,7 @@ def _deform(options: argparse.Namespace) -> int:
     from splap_editor.engine.deformation_check import posed_check
     from splap_editor.engine.quantities import column_names
     from splap_editor.engine.scripting import write_posed
-    from splap_editor.frames_cli import deform_frames, edit_for, read_edit_file
+    from splap_editor.frames_cli import deform_frames, edit_for, read_edit_file, repairing
     from splap_editor.io.formats.table import format_to_write
     from splap_editor.session.side_by_side import side_by_side
 
@@ -231,7 +240,7 @@ def _deform(options: argparse.Namespace) -> int:
     columns = column_names(options.columns)
     held = read_edit_file(options)
     file = _read(options, report)
-    edit = edit_for(held, file, report.say)
+    edit = repairing(edit_for(held, file, report.say), options)
     lost = _said_losses(options, file, row, report, is_edited=not edit.is_identity)
     cache = None if options.no_cache else StageCache(say=lambda text: report.say(f"note: {text}"))
     made = posed(file, edit, cache=cache, stages=report.stage, run=side_by_side(), with_surface=bool(columns))

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from splap_editor.core.adaptation.options import RepairOptions
 from splap_editor.io import plain_edit as plain
 from splap_editor.io.atomic_file import not_written
 from splap_editor.io.content_hash import has_content
@@ -53,6 +54,12 @@ def edit_for(held: plain.Edit | SessionFile | None, file: "SplatFile", say: Call
     if held.ply.content_hash and not has_content(file.path, held.ply.content_hash):
         say(f"note: {file.path.name} is not the file that the session was saved with, or has changed since")
     return session_edit(held, file.splats)
+
+
+def repairing(edit: "Edit", options: argparse.Namespace) -> "Edit":
+    """An edit with the limit of ``--repair``, where the command has that flag and it was given."""
+    limit = getattr(options, "repair", None)
+    return edit if limit is None else edit.with_options(RepairOptions(limit))
 
 
 def deform_frames(options: argparse.Namespace) -> int:
@@ -154,7 +161,7 @@ def _prepared(
         file = read_splats(options.file, layout=layout, progress=report.progress)
     for warning in file.warnings:
         report.say(f"note: {warning}")
-    edit = edit_for(held, file, report.say)
+    edit = repairing(edit_for(held, file, report.say), options)
     cache = None if options.no_cache else StageCache(say=lambda text: report.say(f"note: {text}"))
     surface, bound = bound_file(file, edit, cache=cache, stages=report.stage, run=side_by_side())
     report.end_stage()

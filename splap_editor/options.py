@@ -11,6 +11,7 @@ from splap_editor.io.recipe import recipe_groups
 if TYPE_CHECKING:
     # For type checkers, which read no tables; at run time the groups come from `GROUPS`.
     from splap_editor.core.adaptation.options import AdaptationOptions as AdaptationOptions
+    from splap_editor.core.adaptation.options import RepairOptions as RepairOptions
     from splap_editor.core.arap.options import ArapOptions as ArapOptions
     from splap_editor.core.bbw.options import BbwOptions as BbwOptions
     from splap_editor.core.graph.options import GraphOptions as GraphOptions

@@ -65,7 +65,7 @@ class Posed:
 
     @property
     def splats(self) -> Splats:
-        """Splats to write, removed ones included: those of the file, with the changed rows replaced, in their place."""
+        """The file's splats, removed ones included, with the changed rows replaced, in their place; none is split."""
         return written_splats(self.rest, self.kernels, self.edit, self.surface)
 
     @property
@@ -266,9 +266,20 @@ def written_splats(
     progress: Progress = no_progress,
 ) -> Splats:
     """Splats to write: as adapted, then graded, then in their place; ``surface`` is needed by a grade's falloff."""
-    splats = rest if kernels is None else adapted_splats(rest, kernels, part_of(progress, 0.0, 0.4))
-    graded = edit.grading.graded(splats, surface, part_of(progress, 0.4, 0.7))
-    return placed_splats(graded, edit.place, part_of(progress, 0.7, 1.0))
+    splats = unplaced_splats(rest, kernels, edit, surface, part_of(progress, 0.0, 0.7))
+    return placed_splats(splats, edit.place, part_of(progress, 0.7, 1.0))
+
+
+def unplaced_splats(
+    rest: Splats,
+    kernels: AdaptedKernels | None,
+    edit: Edit,
+    surface: Surface | None = None,
+    progress: Progress = no_progress,
+) -> Splats:
+    """Splats as adapted, then graded, in the file's coordinates."""
+    splats = rest if kernels is None else adapted_splats(rest, kernels, part_of(progress, 0.0, 0.6))
+    return edit.grading.graded(splats, surface, part_of(progress, 0.6, 1.0))
 
 
 def ready_for_drags(surface: Surface, cache: StageCache | None = None) -> None:

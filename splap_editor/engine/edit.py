@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from splap_editor.core.adaptation.options import RepairOptions
 from splap_editor.core.base_edit import BaseEdit
 from splap_editor.core.graph.options import GraphOptions
 from splap_editor.core.handle_nodes import Region
@@ -126,6 +127,11 @@ class Edit(BaseEdit[Handle, Pin]):
         return np.array([handle.transform for handle in self.active_handles]).reshape(-1, 4, 4)
 
     @property
+    def repair(self) -> float:
+        """Stretch beyond which splats are split in a file; 0 where none are."""
+        return self.options[RepairOptions].repair
+
+    @property
     def removed(self) -> FileMask | None:
         """(N,) splats that are left out; None where none are."""
         return self.removal.mask
@@ -229,4 +235,5 @@ def poses_like(a: Edit, b: Edit) -> bool:
 
 def writes_like(a: Edit, b: Edit) -> bool:
     """Whether two edits make the same file of the same splats."""
-    return binds_like(a, b) and poses_like(a, b) and a.place == b.place and a.grading.like(b.grading)
+    is_alike = a.place == b.place and a.grading.like(b.grading) and a.repair == b.repair
+    return is_alike and binds_like(a, b) and poses_like(a, b)

@@ -22,13 +22,15 @@ class ExportReport:
     ----------
     path : Path
     n_splats, n_changed : int
-        Rows in the file, and rows that the deformation changed.
+        Rows in the file, and rows of the source that the deformation changed.
     largest_displacement : float
         World units.
     largest_stretch : float
         Largest factor by which a splat's in-plane semi-axis grew or shrank; 1 when none did.
     n_removed : int
         Rows of the source that are not in the file.
+    n_split, n_new : int
+        Rows of the source that were split, and rows that came of it after those of the source.
     is_placed : bool
         Everything was moved, turned or scaled as one body.
     is_graded : bool
@@ -50,17 +52,20 @@ class ExportReport:
     is_graded: bool = False
     form: str = ""
     check: "DeformationCheck | None" = None
+    n_split: int = 0
+    n_new: int = 0
 
     def __str__(self) -> str:
         kept = "none of them moved" if self.is_graded or self.form else "unchanged"
         parts = [f"{self.path.name}: {self.n_splats:,} splats, {kept}"]
         if self.n_changed:
             parts = [
-                f"{self.path.name}: {self.n_changed:,} of {self.n_splats:,} splats changed",
+                f"{self.path.name}: {self.n_changed:,} of {self.n_splats - self.n_new:,} splats changed",
                 f"moved by up to {self.largest_displacement:.4g}",
                 f"stretched by up to {self.largest_stretch:.3g} ×",
             ]
         parts += [f"{self.n_removed:,} removed"] if self.n_removed else []
+        parts += [f"{self.n_split:,} splats split into {self.n_new:,} new rows"] if self.n_split else []
         parts += ["all of them put in their place"] if self.is_placed else []
         parts += ["colours graded"] if self.is_graded else []
         parts += [self.form] if self.form else []

@@ -119,6 +119,8 @@ def write_frames(
 ) -> list[Path]:
     """Write a splat file for each frame, or one file of all where its format holds an animation.
 
+    Files of one frame each are repaired if the edit says so, each by its own pose.
+
     Parameters
     ----------
     poser : FramePoser
@@ -140,6 +142,8 @@ def write_frames(
     """
     row = format_to_write(path)
     if holds_all_frames(path):
+        if poser.edit.repair:
+            say(f"No splats are split: all frames of {path.name} are of the same ones.")
         if row.writes_frames:
             _write_animation(poser, file, frames, path, progress)
         else:

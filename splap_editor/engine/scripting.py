@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,12 +15,13 @@ from splap_editor.core.graph.splat_graph import SplatGraph, splat_graph
 from splap_editor.core.index_spaces import FileMask
 from splap_editor.core.progress import Runner, StageProgress, in_turn, silent
 from splap_editor.core.splats.occupancy import Ellipses, occupancy_ellipses
-from splap_editor.engine.bound_edit import posed, written_splats
+from splap_editor.engine.bound_edit import posed
 from splap_editor.engine.cache import StageCache
 from splap_editor.engine.deformation_check import DeformationCheck, posed_check
 from splap_editor.engine.edit import Edit
 from splap_editor.engine.export_report import ExportReport, export_report
 from splap_editor.engine.quantities import Snapshot, columns_of
+from splap_editor.engine.repairing import written_scene
 from splap_editor.engine.surface import Surface, surface_of
 from splap_editor.io import plain_edit as plain
 from splap_editor.io.edges_ply import write_edges_ply
@@ -122,7 +124,7 @@ def write_posed(
     kernels : AdaptedKernels or None
         None where everything is at rest.
     edit : Edit
-        Says which splats are left out, how the others are graded, and where they are put.
+        Says which splats are left out, how the others are graded, where they are put, and which are split.
     surface : Surface, optional
         Needed where a grade fades out along it.
     columns : sequence of str
@@ -138,11 +140,15 @@ def write_posed(
     """
     if columns and snapshot is None:
         raise ValueError("columns need the snapshot that they are worked out from")
-    splats = written_splats(file.splats, kernels, edit, surface, stages("colour"))
+    made = written_scene(file, kernels, edit, surface, stages("colour"))
     progress = stages("write")
-    extra = columns_of(columns, snapshot) if snapshot is not None else {}
-    form = write_splats(path, file, splats, removed=edit.removed, as_3dgs=as_3dgs, extra=extra, progress=progress)
-    return export_report(Path(path), file.splats, kernels, edit, form, check)
+    extra = made.with_copies(columns_of(columns, snapshot) if snapshot is not None else {})
+    form = write_splats(
+        path, made.file, made.splats, removed=made.removed, as_3dgs=as_3dgs, extra=extra, progress=progress
+    )
+    report = export_report(Path(path), file.splats, kernels, edit, form, check)
+    n_new = len(made.copied)
+    return replace(report, n_splats=report.n_splats + n_new, n_split=made.n_split, n_new=n_new)
 
 
 def write_graph(

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.index_spaces import FileRow
+from splap_editor.core.index_spaces import FileRow, FileRows
 from splap_editor.core.progress import Progress, no_progress
 from splap_editor.io.ply_header import PlyElement, PlyError, PlyHeader
 from splap_editor.io.ply_table import CellChanges, NewColumn, PlyTable, replaced_cells
@@ -34,6 +34,14 @@ class ListTable(PlyTable):
     def element(self, name: str) -> NDArray | None:
         """Return what is no list of the vertex element; the others are kept as bytes alone."""
         return self.scalars if name == "vertex" else None
+
+    def with_copies(self, rows: FileRows) -> PlyTable:
+        """The same file with copies of some rows (M,) of the vertex element, lists included, after its own."""
+        blocks = list(_row_blocks(self.name, self.header, self.header.vertex, self.body, self.start))
+        starts = np.concatenate([offsets[:, 0] for offsets in blocks])[rows]
+        ends = np.concatenate([offsets[:, -1] for offsets in blocks])
+        added = [self.body[start:end] for start, end in zip(starts.tolist(), ends[rows].tolist(), strict=True)]
+        return list_table(self.name, *self._grown(rows, int(ends[-1]), np.concatenate(added)))
 
     def blocks(
         self,

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from splap_editor.core.index_spaces import FileRows
 from splap_editor.core.progress import Progress, no_progress
-from splap_editor.io.ply_header import PlyError, PlyHeader
+from splap_editor.io.ply_header import PlyError, PlyHeader, ply_header
 
 CellChanges = dict[str, tuple[NDArray[np.intp], NDArray]]
 """Column name → rows (counted from the first row of the block) and the values to put there."""
@@ -84,6 +84,17 @@ class PlyTable:
     def offset_of(self, rows: NDArray) -> int:
         """Bytes before a view into the body."""
         return rows.__array_interface__["data"][0] - self.body.__array_interface__["data"][0]
+
+    def with_copies(self, rows: FileRows) -> "PlyTable":
+        """The same file with copies of some rows (M,) of the vertex element after its own."""
+        held = self.rows
+        end = self.offset_of(held) + held.nbytes
+        return binary_table(self.name, *self._grown(rows, end, held[rows].view(np.uint8)))
+
+    def _grown(self, rows: FileRows, end: int, added: NDArray[np.uint8]) -> tuple[PlyHeader, NDArray[np.uint8]]:
+        """Header and body with the bytes of so many more rows where the file's own end."""
+        header = ply_header(self.header.with_columns([], self.n_rows + len(rows)), self.name)
+        return header, np.concatenate([self.body[:end], added, self.body[end:]])
 
     def blocks(
         self,

@@ -10,7 +10,7 @@ from io import BytesIO
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.index_spaces import FileRow
+from splap_editor.core.index_spaces import FileRow, FileRows
 from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.io.ply_header import PlyElement, PlyError, PlyHeader
 from splap_editor.io.ply_table import CellChanges, NewColumn, PlyTable, cast_values, field_types, replaced_cells
@@ -40,6 +40,15 @@ class TextTable(PlyTable):
     def element(self, name: str) -> NDArray | None:
         """Return the vertex element as a structured array; text holds no views of the others."""
         return self.numbers if name == "vertex" else None
+
+    def with_copies(self, rows: FileRows) -> PlyTable:
+        """The same file with copies of some lines (M,) of the vertex element after its own."""
+        end = int(self.line_starts[-1])
+        ends_open = end > 0 and self.body[end - 1] not in b"\r\n"
+        newline = self.header.newline
+        lines = (self.body[self.line_starts[row] : self.line_starts[row + 1]].tobytes() for row in rows.tolist())
+        added = (newline if ends_open else b"") + b"".join(line.rstrip(b"\r\n") + newline for line in lines)
+        return text_table(self.name, *self._grown(rows, end, np.frombuffer(added, np.uint8)))
 
     def blocks(
         self,

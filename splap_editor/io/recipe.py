@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from splap_editor.core.adaptation.options import AdaptationOptions
+from splap_editor.core.adaptation.options import AdaptationOptions, RepairOptions
 from splap_editor.core.deformers import DEFORMERS, method_titles
 from splap_editor.core.graph.options import GraphOptions, Joint, Separation
 from splap_editor.core.options import OptionSet, ShareOfSize, options_of
@@ -53,7 +53,7 @@ HANDLE_KEYS = ("name", *REGION_KEYS, "translate", "rotate", "scale", *options_of
 
 def recipe_groups() -> tuple[tuple[str, type], ...]:
     """Option groups in the order of their keys; an empty key for those whose options are keys of the recipe itself."""
-    groups = [("graph", GraphOptions), ("", ReachOptions), ("", AdaptationOptions)]
+    groups = [("graph", GraphOptions), ("", ReachOptions), ("", AdaptationOptions), ("", RepairOptions)]
     for row in DEFORMERS:
         if (row.key, row.options) not in groups:
             groups.insert(2 if row.key else len(groups), (row.key, row.options))

@@ -4,6 +4,8 @@ import numpy as np
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QApplication
 
+from splap_editor.core.adaptation.options import RepairOptions
+from splap_editor.engine.scripting import write_posed
 from splap_editor.io.ply import read_ply
 from splap_editor.ui.dialogs.export_dialog import ExportDialog
 from splap_editor.ui.main_window import HINT
@@ -17,6 +19,12 @@ def arrow_pixel(driver, axis: int) -> QPoint:
     gizmo = viewport.gizmo
     length = 0.7 * gizmo.arm_length(viewport.projection)
     return driver.pixel_of(gizmo.frame[:3, 3] + length * np.eye(3)[axis])
+
+
+def shown_export() -> ExportDialog:
+    """The export's dialog that is open."""
+    found = [widget for widget in QApplication.topLevelWidgets() if isinstance(widget, ExportDialog)]
+    return next(dialog for dialog in found if dialog.isVisible())
 
 
 def test_click_drag_undo_and_export_give_a_file_with_what_was_on_screen(driver, qtbot, tmp_path):
@@ -66,6 +74,28 @@ def test_click_drag_undo_and_export_give_a_file_with_what_was_on_screen(driver, 
     assert not driver.session.has_unexported_edit
     # An export keeps no handle.
     assert window.isWindowModified()
+
+    # Split where it is drawn out: ticked in the dialog, a step of the history, and the same file as a script makes.
+    driver.session.steps.change_edit(scene.edit.with_options(RepairOptions(1.05)), "Repair")
+    driver.session.history.undo()
+    assert not scene.edit.repair
+    driver.session.history.redo()
+    driver.key(Qt.Key.Key_E, Qt.KeyboardModifier.ControlModifier)
+    dialog = shown_export()
+    assert dialog.repair_box.isVisible() and dialog.repair_box.isChecked() and dialog.repair == 1.05
+    repaired = tmp_path / "repaired.ply"
+    dialog.path_field.setText(str(repaired))
+    dialog.accept_button.click()
+    qtbot.waitUntil(lambda: "split into" in window.toast.text, timeout=60_000)
+    write_posed(tmp_path / "script.ply", scene.file, scene.kernels, scene.edit)
+    assert repaired.read_bytes() == (tmp_path / "script.ply").read_bytes()
+    driver.key(Qt.Key.Key_E, Qt.KeyboardModifier.ControlModifier)
+    dialog = shown_export()
+    dialog.repair_box.click()
+    dialog.path_field.setText(str(tmp_path / "whole.ply"))
+    dialog.accept_button.click()
+    qtbot.waitUntil((tmp_path / "whole.ply").exists, timeout=60_000)
+    assert not scene.edit.repair and (tmp_path / "whole.ply").read_bytes() == target.read_bytes()
 
 
 def test_escape_during_a_drag_leaves_pose_and_history_as_they_were(driver, qtbot):

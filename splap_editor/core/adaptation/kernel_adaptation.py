@@ -34,10 +34,13 @@ class AdaptedKernels:
         What was adapted.
     arrays : KernelArrays
         Results in carried order, see there.
+    deformation : Deformation
+        What they were adapted to.
     """
 
     binding: KernelBinding
     arrays: KernelArrays
+    deformation: Deformation
 
     @property
     def means_f32(self) -> NDArray[np.float32]:
@@ -181,15 +184,9 @@ def adapt_kernels(
     """
     _validate(binding, deformation, method, hops)
     rest = binding.rest
-    positions = np.ascontiguousarray(deformation.positions, np.float64)
-    rotations = np.ascontiguousarray(deformation.rotations, np.float64)
-    if method == "none":
-        rotations = np.broadcast_to(np.eye(3), rotations.shape).copy()
     arrays = _blank_arrays(binding, out)
-    moved = np.empty(len(positions), np.bool_)
-    still = STILL_SHARE * binding.ellipses.scene_scale
-    resting = deformation.resting if deformation.resting is not None else np.zeros(len(positions), np.bool_)
-    nodes = rest.means, positions, rotations, resting, still, moved
+    nodes = _nodes_of(binding, deformation, turns=method != "none")
+    _, positions, rotations, resting, _, moved = nodes
     if method == "none":
         find_moved(*nodes)
         _move_centers(rest, positions, moved, arrays)
@@ -198,7 +195,30 @@ def adapt_kernels(
         write_kernels(carriers, weights, motions, square_shifts, moved, resting, rotations, rest, arrays)
         binding.spare_motions.append(motions)
     adapt_inert(binding.inert_carriers, binding.inert_weights, rest, positions, rotations, moved, arrays)
-    return AdaptedKernels(binding, arrays)
+    return AdaptedKernels(binding, arrays, deformation)
+
+
+def node_motions(kernels: AdaptedKernels) -> NDArray[np.float64]:
+    """(n, 12) affine map of the surface around each node, as "surface" carries ellipses.
+
+    Column by column, then what is added: ``t' = A t + b``.
+    """
+    binding = kernels.binding
+    motions, square_shifts = np.empty((binding.ellipses.n_nodes, 12)), np.empty(binding.ellipses.n_nodes)
+    nodes = _nodes_of(binding, kernels.deformation)
+    find_motions(binding.stencils, binding.inverse_moments, binding.dampings, *nodes, motions, square_shifts)
+    return motions
+
+
+def _nodes_of(binding: KernelBinding, deformation: Deformation, *, turns: bool = True) -> _Nodes:
+    """Nodes of a deformation, as the loops over them take them; without turns if these do not count."""
+    positions = np.ascontiguousarray(deformation.positions, np.float64)
+    rotations = np.ascontiguousarray(deformation.rotations, np.float64)
+    if not turns:
+        rotations = np.broadcast_to(np.eye(3), rotations.shape).copy()
+    resting = deformation.resting if deformation.resting is not None else np.zeros(len(positions), np.bool_)
+    still = STILL_SHARE * binding.ellipses.scene_scale
+    return binding.rest.means, positions, rotations, resting, still, np.empty(len(positions), np.bool_)
 
 
 def _carrier_motions(

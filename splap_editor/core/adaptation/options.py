@@ -1,4 +1,4 @@
-"""How each splat's ellipse follows the deformed surface: options."""
+"""How each splat's ellipse follows the deformed surface, and what becomes of one drawn out far: options."""
 
 from dataclasses import dataclass
 
@@ -44,3 +44,29 @@ class AdaptationOptions:
 
     def __post_init__(self) -> None:
         check_options(self)
+
+
+@dataclass(frozen=True)
+class RepairOptions:
+    """What becomes of drawn-out splats in a file that is written.
+
+    Parameters
+    ----------
+    repair : float
+        Stretch beyond which a splat is written as several, see `splap_editor.core.adaptation.repair`; 0 for none.
+    """
+
+    repair: float = option(
+        0.0,
+        "Splats drawn out to more than so many times their length are split when a file is written; 0 for none.",
+        label="Split beyond",
+        least=0.0,
+        most=100.0,
+    )
+
+    def __post_init__(self) -> None:
+        check_options(self)
+
+
+USUAL_REPAIR = 2.0
+"""Limit of a repair that nobody gives one."""

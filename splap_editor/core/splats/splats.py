@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.index_spaces import FileMask
+from splap_editor.core.index_spaces import FileMask, FileRows
 
 LARGEST_COORDINATE = 1e30
 """Largest coordinate and size of a splat, and largest move of a handle, in world units."""
@@ -91,8 +91,8 @@ class Splats:
         middle, high = np.percentile(ratios, (50, 95))
         return bool(middle < 0.1 and high < 0.5)
 
-    def at(self, rows: FileMask) -> "Splats":
-        """Splats of some rows, by a mask (N,), as copies."""
+    def at(self, rows: FileMask | FileRows) -> "Splats":
+        """Splats of some rows, by a mask (N,) or by their numbers, as copies."""
         held: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
         taken: dict[str, Any] = {name: part[rows] for name, part in held.items() if isinstance(part, np.ndarray)}
         return replace(self, **taken)

@@ -9,6 +9,7 @@ from PySide6.QtCore import QSettings, QStandardPaths, Qt, QUrl
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QFileDialog, QMessageBox, QWidget
 
+from splap_editor.core.adaptation.options import RepairOptions
 from splap_editor.engine.export_report import ExportReport
 from splap_editor.io.formats.table import stem_of
 from splap_editor.io.session_file import SUFFIX
@@ -114,6 +115,10 @@ class FileActions:
 
     def _export(self, dialog: ExportDialog) -> None:
         QSettings().setValue("files/folder", str(dialog.path.parent))
+        edit = self._session.shown_scene.edit
+        if dialog.repair != edit.repair:
+            title = "Split when exported" if dialog.repair else "Split nothing when exported"
+            self._session.steps.change_edit(edit.with_options(RepairOptions(dialog.repair)), title)
         self._session.export(dialog.path, as_3dgs=dialog.as_3dgs, columns=dialog.column_names)
 
     def export_edit(self) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
+    QCheckBox,
     QDialog,
     QDialogButtonBox,
     QFileDialog,
@@ -16,6 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from splap_editor.core.adaptation.options import USUAL_REPAIR
 from splap_editor.io.formats.table import FORMATS, SplatFormat, format_named, format_to_write
 from splap_editor.io.splat_files import FormatError, name_filter
 from splap_editor.session.jobs import Threads
@@ -68,6 +70,11 @@ class ExportDialog(QDialog):
         self.choice = FormatChoice(scene.file, threads, of_ply, is_edited=is_edited)
         self.choice.chosen.connect(self._on_format_chosen)
         self.finished.connect(self.choice.give_up)
+        self._limit = scene.edit.repair or USUAL_REPAIR
+        self.repair_box = QCheckBox(f"Split splats drawn out to more than {self._limit:g} × their length")
+        self.repair_box.setToolTip("A pulled surface shows no needles. The new rows come after those of the file.")
+        self.repair_box.setChecked(scene.edit.repair > 0.0)
+        self.repair_box.setVisible(bool(scene.edit.active_handles))
         self.note = PlainLabel(wordWrap=True)
         self.columns = ColumnsList(lacks)
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
@@ -82,6 +89,7 @@ class ExportDialog(QDialog):
         layout.setSpacing(3 * STEP)
         layout.addLayout(line)
         layout.addWidget(self.choice)
+        layout.addWidget(self.repair_box)
         layout.addWidget(self.columns)
         layout.addWidget(self.note)
         layout.addStretch(1)
@@ -102,6 +110,11 @@ class ExportDialog(QDialog):
     def as_3dgs(self) -> bool:
         """Whether a third scale is added."""
         return self.choice.as_3dgs
+
+    @property
+    def repair(self) -> float:
+        """Stretch beyond which splats are split; 0 for none."""
+        return self._limit if self.repair_box.isChecked() else 0.0
 
     @property
     def format(self) -> SplatFormat:
