@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from splap_editor.core.progress import Progress, part_of
+from splap_editor.core.progress import Progress, no_progress, part_of
 from splap_editor.io.formats.bare_splats import BLOCK_ROWS, row_blocks
 
 _BINS = 1 << 14
@@ -13,7 +13,9 @@ _ROUNDS = 24
 LARGEST_PALETTE = 1 << 16
 
 
-def codebook(values: NDArray[np.floating]) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+def codebook(
+    values: NDArray[np.floating], progress: Progress = no_progress
+) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
     """Choose 256 numbers that stand for all with little squared error.
 
     Lloyd's iteration on a histogram, from a start that gives crowded and
@@ -23,6 +25,8 @@ def codebook(values: NDArray[np.floating]) -> tuple[NDArray[np.float32], NDArray
     ----------
     values : array of float
         Finite.
+    progress : Progress
+        Told the share done; may cancel.
 
     Returns
     -------
@@ -34,8 +38,11 @@ def codebook(values: NDArray[np.floating]) -> tuple[NDArray[np.float32], NDArray
     low, high = float(values.min()), float(values.max())
     if high <= low:
         return np.full(256, low, np.float32), np.zeros(values.shape, np.uint8)
+    flat = values.reshape(-1)
     # In double precision, as neighbouring single numbers leave no room for bins between them.
-    counts, edges = np.histogram(values.astype(np.float64), _BINS, (low, high))
+    counts, edges = np.histogram(np.empty(0), _BINS, (low, high))
+    for cells in row_blocks(len(flat), part_of(progress, 0.0, 0.5)):
+        counts += np.histogram(flat[cells].astype(np.float64), _BINS, (low, high))[0]
     middles = (edges[:-1] + edges[1:]) / 2
     # The square root of the density lies between equal steps and equal counts.
     share = np.cumsum(np.sqrt(counts))
@@ -49,7 +56,10 @@ def codebook(values: NDArray[np.floating]) -> tuple[NDArray[np.float32], NDArray
     numbers[0], numbers[-1] = low, high
     numbers = np.sort(numbers).astype(np.float32)
     exact = numbers.astype(np.float64)
-    return numbers, np.searchsorted((exact[1:] + exact[:-1]) / 2, values).astype(np.uint8)
+    bounds, labels = (exact[1:] + exact[:-1]) / 2, np.empty(len(flat), np.uint8)
+    for cells in row_blocks(len(flat), part_of(progress, 0.5, 1.0)):
+        labels[cells] = np.searchsorted(bounds, flat[cells])
+    return numbers, labels.reshape(values.shape)
 
 
 def palette(vectors: NDArray[np.float32], progress: Progress) -> tuple[NDArray[np.float32], NDArray[np.int64]]:

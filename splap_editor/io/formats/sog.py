@@ -334,12 +334,10 @@ def write(out: BinaryIO, splats: Splats, progress: Progress) -> None:
             rotations[rows] = _packed_rotations(splats.quats[order[rows]])
         meta["quats"] = {"files": [put("quats.webp", rotations)]}
         told(0.3)
-        values, labels = codebook(splats.log_scales[order])
-        told(0.35)
+        values, labels = codebook(splats.log_scales[order], part_of(told, 0.3, 0.35))
         meta["scales"] = {"codebook": values.tolist(), "files": [put("scales.webp", labels)]}
         told(0.4)
-        values, labels = codebook(splats.sh0[order])
-        told(0.45)
+        values, labels = codebook(splats.sh0[order], part_of(told, 0.4, 0.45))
         alphas = as_bytes(alphas_of(splats.logit_opacities[order]) * 255)
         pixels = np.column_stack([labels, alphas])
         meta["sh0"] = {"codebook": values.tolist(), "files": [put("sh0.webp", pixels)]}
@@ -378,8 +376,7 @@ def _put_harmonics(
     for rows in row_blocks(n, part_of(progress, 0.0, 0.1)):
         vectors[rows] = shN[order[rows]].reshape(-1, 3 * n_coefficients)
     entries, chosen = palette(vectors, part_of(progress, 0.1, 0.8))
-    values, labels = codebook(entries)
-    progress(0.85)
+    values, labels = codebook(entries, part_of(progress, 0.8, 0.85))
     n_lines = math.ceil(len(entries) / 64)
     names = [put("shN_centroids.webp", labels.reshape(-1, 3), (64 * n_coefficients, n_lines))]
     progress(0.9)
