@@ -155,7 +155,11 @@ class JsonObject:
     def options(self, group: type[Group], usual: Group | None = None) -> Group:
         """An option group, each option under its name; a missing one is as in ``usual``, or takes its default."""
         said = {name: self._option(name, known) for name, known in options_of(group).items() if name in self}
-        return group(**said) if usual is None else replace(usual, **said)  # type: ignore[type-var]
+        try:
+            return group(**said) if usual is None else replace(usual, **said)  # type: ignore[type-var]
+        except ValueError as error:
+            # What no single option tells: values that do not go together, or a gap in their range.
+            raise self._error(str(error)) from None
 
     def _option(self, key: str, known: Option) -> Any:
         if known.kind == "pairs":

@@ -91,5 +91,6 @@ def test_recipes_hold_a_repair_and_edits_tell_it_apart():
     edit = edit_of(plain, splats)
     assert not writes_like(edit, edit.with_options(RepairOptions(3.0))) and edit.repair == 0.0
     assert repairing.options == OptionSet(*plain.options, RepairOptions(3.0))
-    with pytest.raises(RecipeError, match="repair must be"):
-        recipe_from_json({**PULL, "repair": -1})
+    for limit in (-1, 0.5, 1):
+        with pytest.raises(RecipeError, match="repair must be"):
+            recipe_from_json({**PULL, "repair": limit})

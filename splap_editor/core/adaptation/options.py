@@ -54,6 +54,11 @@ class RepairOptions:
     ----------
     repair : float
         Stretch beyond which a splat is written as several, see `splap_editor.core.adaptation.repair`; 0 for none.
+
+    Raises
+    ------
+    ValueError
+        If it is above 0 and not above 1: nothing is drawn out less than not at all.
     """
 
     repair: float = option(
@@ -66,6 +71,8 @@ class RepairOptions:
 
     def __post_init__(self) -> None:
         check_options(self)
+        if 0.0 < self.repair <= 1.0:
+            raise ValueError(f"repair must be above 1, or 0 to split nothing, got {self.repair!r}")
 
 
 USUAL_REPAIR = 2.0
