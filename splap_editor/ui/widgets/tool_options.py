@@ -97,7 +97,6 @@ class ToolOptionsBar(QWidget):
         # Before it is shown a tool bar has other sizes, and keeps what it was asked for.
         if not self.isVisible():
             return
-        self._options.setFixedHeight(self._strip.sizeHint().height())
         room = max(self.width() - self._least_width, LEAST_OPTIONS_PX)
         self._options.setFixedWidth(min(self._row.sizeHint().width(), room))
 
@@ -187,6 +186,10 @@ def _scrolled(row: QWidget) -> QScrollArea:
     options.setFrameShape(QFrame.Shape.NoFrame)
     options.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
     options.setWidget(row)
+    # The buttons beside it say how high the bar is, from the first layout on: a picture that is laid out anew under
+    # another height keeps the memory of both.
+    options.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Ignored)
+    options.setMinimumHeight(1)
     return options
 
 
