@@ -97,10 +97,12 @@ class LevelTool(Tool):
         self._show(middle, normal, reach, "Floor through three points")
 
     def take(self, event: KeyEvent) -> bool:
-        """Keep what is shown."""
+        """Keep what is shown, and look at it: the turn may have taken it out of the picture."""
+        had = self._is_shown or self._is_asked or bool(self.points)
         if self._is_shown:
             self.context.session.drag.commit("Level object")
-        return self._is_shown or self._is_asked or bool(self.points)
+            self.context.fly_to(self.context.viewport.frame())
+        return had
 
     def let_go(self, event: KeyEvent) -> bool:
         """Leave the object as it was."""
