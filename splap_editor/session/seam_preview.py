@@ -59,9 +59,10 @@ def seam_line(middles: NDArray[np.float64]) -> tuple[NDArray[np.int64], float]:
         return np.empty((0, 2), np.int64), 0.0
     k = min(N_BESIDE + 1, n)
     apart, beside = cKDTree(middles).query(middles, k=k)
-    starts = np.repeat(np.arange(n), k)
+    # Spanning trees of older scipy take no other integers.
+    starts, ends = np.repeat(np.arange(n, dtype=np.int32), k), beside.ravel().astype(np.int32)
     # One more than the distance: middles that coincide are joined too.
-    near = sp.coo_array((apart.ravel() + 1.0, (starts, beside.ravel())), shape=(n, n)).tocsr()
+    near = sp.coo_array((apart.ravel() + 1.0, (starts, ends)), shape=(n, n)).tocsr()
     near.setdiag(0.0)
     near.eliminate_zeros()
     tree = minimum_spanning_tree(near.maximum(near.T)).tocoo()
