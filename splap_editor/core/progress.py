@@ -70,6 +70,7 @@ def in_turn(parts: Sequence[Callable[[Progress], Result]], told: Callable[[Seque
         """Progress of one part."""
 
         def progress(share: float) -> None:
+            """Note the part's share, and tell those of all."""
             shares[number] = share
             told(shares)
 

@@ -1,7 +1,7 @@
 """What a session does in the background, as a table of stages: file → surface → bound handles → pose → file."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from splap_editor.engine.bound_edit import BoundEdit
@@ -294,21 +294,27 @@ def _pose_like(a: PoseRequest, b: PoseRequest) -> bool:
     return a.bound is b.bound and binds_like(a.edit, b.edit) and poses_like(a.edit, b.edit)
 
 
+_EXPORT = Stage(
+    "export",
+    needs=lambda ledger: bool(ledger.exports) and not ledger.is_dragging,
+    is_current=lambda ledger: False,
+    state=lambda ledger: ledger.state_at_rest,
+    cancels=(),
+    awaits=("export at rest", "export"),
+    request=_export_request,
+    make=exported_file,
+    take=_take_export,
+    fail=_forget_export,
+    title=lambda request: f"Exporting {request.order.path.name}",
+)
+
 STAGES = (
-    Stage(
-        "export at rest",
-        needs=lambda ledger: (
-            bool(ledger.exports) and ledger.is_written_at_once(ledger.exports[0]) and not ledger.is_dragging
-        ),
-        is_current=lambda ledger: False,
+    replace(
+        _EXPORT,
+        name="export at rest",
+        needs=lambda ledger: _EXPORT.needs(ledger) and ledger.is_written_at_once(ledger.exports[0]),
         state=lambda ledger: ledger.state,
-        cancels=(),
-        awaits=("export at rest", "export"),
         request=_rest_export_request,
-        make=exported_file,
-        take=_take_export,
-        fail=_forget_export,
-        title=lambda request: f"Exporting {request.order.path.name}",
         is_at_once=True,
         is_beside=True,
     ),
@@ -389,19 +395,7 @@ STAGES = (
         fail=_give_up,
         title=lambda request: "Settling",
     ),
-    Stage(
-        "export",
-        needs=lambda ledger: bool(ledger.exports) and not ledger.is_dragging,
-        is_current=lambda ledger: False,
-        state=lambda ledger: ledger.state_at_rest,
-        cancels=(),
-        awaits=("export at rest", "export"),
-        request=_export_request,
-        make=exported_file,
-        take=_take_export,
-        fail=_forget_export,
-        title=lambda request: f"Exporting {request.order.path.name}",
-    ),
+    _EXPORT,
 )
 """In the order in which they build on each other: the first that is called for and not current is made next, and beside
 it what is in nobody's way."""

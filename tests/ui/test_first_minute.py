@@ -1,5 +1,7 @@
 """What a new user does in the first minute, with a real mouse and real keys."""
 
+from pathlib import Path
+
 import numpy as np
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QApplication
@@ -21,10 +23,17 @@ def arrow_pixel(driver, axis: int) -> QPoint:
     return driver.pixel_of(gizmo.frame[:3, 3] + length * np.eye(3)[axis])
 
 
-def shown_export() -> ExportDialog:
-    """The export's dialog that is open."""
+def shown_export(driver) -> ExportDialog:
+    """Open the export's dialog by its key."""
+    driver.key(Qt.Key.Key_E, Qt.KeyboardModifier.ControlModifier)
     found = [widget for widget in QApplication.topLevelWidgets() if isinstance(widget, ExportDialog)]
     return next(dialog for dialog in found if dialog.isVisible())
+
+
+def export(dialog: ExportDialog, path: Path) -> None:
+    """Type a path and press the button."""
+    dialog.path_field.setText(str(path))
+    dialog.accept_button.click()
 
 
 def test_click_drag_undo_and_export_give_a_file_with_what_was_on_screen(driver, qtbot, tmp_path):
@@ -62,11 +71,8 @@ def test_click_drag_undo_and_export_give_a_file_with_what_was_on_screen(driver, 
     driver.wait_idle()
     np.testing.assert_allclose(scene.kernels.means, moved, atol=1e-9)
 
-    driver.key(Qt.Key.Key_E, Qt.KeyboardModifier.ControlModifier)
-    dialog = next(widget for widget in QApplication.topLevelWidgets() if isinstance(widget, ExportDialog))
     target = tmp_path / "bent.ply"
-    dialog.path_field.setText(str(target))
-    dialog.accept_button.click()
+    export(shown_export(driver), target)
     qtbot.waitUntil(target.exists, timeout=60_000)
     qtbot.waitUntil(lambda: window.toast.text.startswith("Exported"), timeout=60_000)
     # The file holds float32.
@@ -80,20 +86,16 @@ def test_click_drag_undo_and_export_give_a_file_with_what_was_on_screen(driver, 
     driver.session.history.undo()
     assert not scene.edit.repair
     driver.session.history.redo()
-    driver.key(Qt.Key.Key_E, Qt.KeyboardModifier.ControlModifier)
-    dialog = shown_export()
+    dialog = shown_export(driver)
     assert dialog.repair_box.isVisible() and dialog.repair_box.isChecked() and dialog.repair == 1.05
     repaired = tmp_path / "repaired.ply"
-    dialog.path_field.setText(str(repaired))
-    dialog.accept_button.click()
+    export(dialog, repaired)
     qtbot.waitUntil(lambda: "split into" in window.toast.text, timeout=60_000)
     write_posed(tmp_path / "script.ply", scene.file, scene.kernels, scene.edit)
     assert repaired.read_bytes() == (tmp_path / "script.ply").read_bytes()
-    driver.key(Qt.Key.Key_E, Qt.KeyboardModifier.ControlModifier)
-    dialog = shown_export()
+    dialog = shown_export(driver)
     dialog.repair_box.click()
-    dialog.path_field.setText(str(tmp_path / "whole.ply"))
-    dialog.accept_button.click()
+    export(dialog, tmp_path / "whole.ply")
     qtbot.waitUntil((tmp_path / "whole.ply").exists, timeout=60_000)
     assert not scene.edit.repair and (tmp_path / "whole.ply").read_bytes() == target.read_bytes()
 
