@@ -4,10 +4,8 @@ from PySide6.QtCore import QEvent, QPoint, QRect, QSettings, QSize, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QKeyEvent
 from PySide6.QtWidgets import (
     QApplication,
-    QDockWidget,
     QMainWindow,
     QMenu,
-    QScrollArea,
     QSizePolicy,
     QToolBar,
     QVBoxLayout,
@@ -51,9 +49,10 @@ from splap_editor.ui.panels.display_panel import DisplayPanel
 from splap_editor.ui.panels.floaters_panel import FloatersPanel
 from splap_editor.ui.panels.grade_panel import GradePanel
 from splap_editor.ui.panels.handles_panel import HandlesPanel
+from splap_editor.ui.panels.panel_dock import PanelDock
 from splap_editor.ui.panels.place_panel import PlacePanel
 from splap_editor.ui.panels.scene_panel import ScenePanel
-from splap_editor.ui.panels.section import Section, bring_into_view
+from splap_editor.ui.panels.section import bring_into_view
 from splap_editor.ui.preferences import PreferenceStore
 from splap_editor.ui.theme import show_more_button
 from splap_editor.ui.timeline.strip import TimelineStrip
@@ -147,8 +146,7 @@ class MainWindow(FileDrop, QMainWindow):
             say=self.toast.say,
             fly_to=lambda end: self.view_actions.fly_to(end),
         )
-        self.dock = QDockWidget()
-        self.dock.setObjectName("panels")
+        self.dock = PanelDock()
         self.actions_ = self._actions()
         self.program.actions = self.actions_
         self.inspection.set_actions(self.actions_)
@@ -296,27 +294,8 @@ class MainWindow(FileDrop, QMainWindow):
             **dict(self.inspection.panels),
             "Scene": self.scene_panel,
         }
-        self.dock.setTitleBarWidget(QWidget())
-        self.dock.setFeatures(QDockWidget.DockWidgetFeature.NoDockWidgetFeatures)
-        self.dock.toggleViewAction().setVisible(False)
         self.addDockWidget(Qt.DockWidgetArea.RightDockWidgetArea, self.dock)
-        # Whatever gets a parent is styled anew with all that it holds: the panels come last.
-        scroll = QScrollArea(widgetResizable=True)
-        self.dock.setWidget(scroll)
-        page = QWidget()
-        scroll.setWidget(page)
-        stack = QVBoxLayout(page)
-        stack.setContentsMargins(0, 0, 0, 0)
-        stack.setSpacing(0)
-        sections = {title: Section(title, panel, parent=page) for title, panel in panels.items()}
-        for section in sections.values():
-            stack.addWidget(section)
-        self.floaters_section = sections["Floaters"]
-        self.floaters_section.setVisible(False)
-        stack.addStretch(1)
-        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        # Nothing of a panel is cut off at the side.
-        scroll.setMinimumWidth(page.minimumSizeHint().width() + scroll.verticalScrollBar().sizeHint().width())
+        self.floaters_section = self.dock.filled(panels, hidden=("Floaters",))["Floaters"]
         self.resizeDocks([self.dock], [304], Qt.Orientation.Horizontal)
 
     # ---------------------------------------------------------------- state
